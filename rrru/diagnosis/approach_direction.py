@@ -1,4 +1,4 @@
-"""From which side each drive comes to a reading: where the rows do not determine it, and with which odds the data do.
+"""The side from which each drive comes to a reading: where the rows do not determine it, and its posterior odds.
 
 Backlash and friction windup change their sign with the sense in which a drive arrives. At the start of a run no row
 says how the robot got there; near a reversal of a drive the path between the readings is an interpolation, which may
@@ -25,11 +25,11 @@ _FOUR_A_PERIOD = np.sqrt(0.5)
 def read_back_jitter(drive, run):
     """Standard deviation (K,) of the random error of drive values (n, K) along runs (n,).
 
-    The k-th difference of white noise of deviation s has the deviation s sqrt(C(2k, k)); that of a smooth motion gets
-    smaller against it with k. The estimate of a run is that of the first order from which on it does not: where a
-    motion with 4 points a period would get smaller yet. Zero where no order is such, or where a run is short.
-    Deviations are by medians of absolute values, which corners do not change. Of the runs the lower quartile counts: a
-    motion with fewer points a period passes for jitter, and nothing makes a run's jitter smaller.
+    The k-th difference of white noise of deviation s has the deviation s sqrt(C(2k, k)); that of a smooth motion
+    decreases relative to it with k. The estimate of a run is that of the first order from which on it does not
+    decrease, while a motion with 4 points a period still would. Zero where no order is such, or where a run is short.
+    Deviations are by medians of absolute values, which corners do not change. The result is the lower quartile of the
+    runs: a motion with fewer points a period is taken for jitter, and nothing makes a run's jitter smaller.
 
     Source: Hall, Kay and Titterington, Asymptotically optimal difference-based estimation of variance in nonparametric
     regression, Biometrika 77, 1990, for the differences.
@@ -106,8 +106,8 @@ def _reversals(path, width):
 def estimate_approach(case, state, responses):
     """The motion's `approach` (n, K) by what a state leaves of a Case's readings.
 
-    Both senses of every drive are as probable before the data. Those of a stop have the odds of the likelihood of all
-    that was read there, each combination of the drives' senses in turn; the expected sense is their mean.
+    Both senses of every drive have equal prior probability. The combinations of the senses at a stop have the odds of
+    the likelihood of all that was read there; the expected sense is their mean.
     responses (m, 3, K): change of what is read by a sense of 1 of each drive.
     """
     approach = case.motion.approach.copy()

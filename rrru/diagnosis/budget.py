@@ -1,9 +1,8 @@
-"""The budget of a gap: how much of its mean square each effect makes, and what does not repeat, runs and the unknown.
+"""The budget of a gap: shares of its mean square by effects, non-repeatability, offsets per run and discrepancy.
 
-Mean squares are those of positions on the robot. Effects and what is unexplained are drawn from the posterior over
+Mean squares are those of positions on the robot. Effects and the unexplained part are drawn from the posterior over
 hypotheses and their coefficients, with the calibration's share taken out. Squares of parts and twice the products of
-effects that imitate each other add up to the gap's mean square, but for what the draw of the noise has left in it
-("sampling").
+confounded effects add up to the gap's mean square, except for the sampling error of the noise ("sampling").
 """
 
 from itertools import combinations
@@ -28,13 +27,13 @@ def budget(inference, stated_mm, generator, draws):
     residual = inference.case.residual(inference.calibrated)
     instrument = float(noise.pop("instrument").mean())
     gap = float((residual[inference.case.on_robot] ** 2).sum(axis=1).mean()) - instrument
-    beliefs = inference.posterior
+    posterior = inference.posterior
     unexplained = squares.pop(_UNEXPLAINED)
-    rows = [(name, "effect", drawn, beliefs.marginal(name)) for name, drawn in squares.items()]
+    rows = [(name, "effect", drawn, posterior.marginal(name)) for name, drawn in squares.items()]
     rows += [(name, name, *drawn) for name, drawn in noise.items()]
-    rows.append((_UNEXPLAINED, _UNEXPLAINED, unexplained, beliefs.probability_unexplained))
+    rows.append((_UNEXPLAINED, _UNEXPLAINED, unexplained, posterior.probability_unexplained))
     rows += [(" and ".join(pair), "covariance", drawn, np.nan) for pair, drawn in products.items()]
-    # small products are left to what the noise leaves
+    # small products are counted as sampling
     least = OPTIONS.min_covariance_share * max(gap, 1e-12)
     rows = [row for row in rows if row[1] != "covariance" or abs(row[2].mean()) > least]
     known = sum(float(drawn.mean()) for *_, drawn, _ in rows)
@@ -56,26 +55,26 @@ def _drawn(inference, generator, draws):
     """Draws (b,) of mean squares, of effects and of what is unexplained, by name, and of products of two of them; the
     share of the noise that the calibration absorbs.
     """
-    case, evidence, beliefs = inference.case, inference.evidence, inference.posterior
+    case, evidence, posterior = inference.case, inference.evidence, inference.posterior
     linear = evidence.linear
     left = _LeftByCalibration(linear.base, case.on_robot)
-    data, count = left.of(linear.data.reshape(-1, 1)), int(case.on_robot.sum())
-    weights = beliefs.weights.ravel()
+    data, count = left.residual(linear.data.reshape(-1, 1)), int(case.on_robot.sum())
+    weights = posterior.weights.ravel()
     counts = np.bincount(generator.choice(len(weights), draws, p=weights / weights.sum()), minlength=len(weights))
-    names = [name for name in case.effects if beliefs.marginal(name) > OPTIONS.min_budget_probability]
+    names = [name for name in case.effects if posterior.marginal(name) > OPTIONS.min_budget_probability]
     squares = {name: np.zeros(draws) for name in (*names, _UNEXPLAINED)}
     products, first = {pair: np.zeros(draws) for pair in combinations(squares, 2)}, 0
     for number in np.flatnonzero(counts):
-        row, level = np.unravel_index(number, beliefs.weights.shape)
+        row, level = np.unravel_index(number, posterior.weights.shape)
         some = slice(first, first + counts[number])
         first = some.stop
-        parts = _parts(evidence, beliefs.hypotheses[row], level, left, generator, counts[number])
+        parts = _parts(evidence, posterior.hypotheses[row], level, left, generator, counts[number])
         for name in set(parts) & set(squares):
             squares[name][some] = (parts[name] ** 2).sum(axis=0) / count
         for pair in products:
             if set(pair) <= set(parts):
                 products[pair][some] = 2.0 * (parts[pair[0]] * parts[pair[1]]).sum(axis=0) / count
-        if beliefs.unexplained[row, level] and _UNEXPLAINED not in parts:
+        if posterior.unexplained[row, level] and _UNEXPLAINED not in parts:
             beyond = data - sum(parts.values(), np.zeros((len(data), counts[number])))
             spare = 3.0 * case.noise_mm**2 * (1.0 - left.taken)
             squares[_UNEXPLAINED][some] = np.maximum((beyond**2).sum(axis=0) / count - spare, 0.0)
@@ -83,7 +82,7 @@ def _drawn(inference, generator, draws):
 
 
 class _LeftByCalibration:
-    """What a calibration of columns (m, 3, p) leaves of numbers at those of the m readings that count.
+    """Residuals of a calibration with columns (m, 3, p), at those of the m readings that count.
 
     taken: share of the noise that it absorbs there.
     """
@@ -93,22 +92,20 @@ class _LeftByCalibration:
         self._counted = np.repeat(counted, 3)
         self.taken = float((self._basis[self._counted] ** 2).sum() / self._counted.sum())
 
-    def of(self, numbers):
-        """Of numbers (3m, k) at all readings those (3n, k) at the readings that count."""
+    def residual(self, numbers):
+        """Residuals (3n, k) at the readings that count, of numbers (3m, k) at all readings."""
         return numbers[self._counted] - self._basis[self._counted] @ (self._basis.T @ numbers)
 
 
 def _parts(evidence, hypothesis, level, left, generator, count):
-    """By effect of a hypothesis what the calibration leaves of its part of the gap, (3n, count), at drawn coefficients.
+    """By effect of a hypothesis its part of the gap (3n, count) beyond the calibration, at drawn coefficients.
 
-    left: a _LeftByCalibration.
-
-    Those of unknown functions together are what is unexplained.
+    left: a _LeftByCalibration. Those of discrepancy functions together are the unexplained part.
     """
     if not hypothesis.terms:
         return {}
     mean, covariance = evidence.coefficients(hypothesis.terms, hypothesis.prior_scales[level], level)
-    # numbers of very different sizes
+    # coefficients have very different sizes
     unit = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
     size, turned = np.linalg.eigh(covariance / np.outer(unit, unit))
     shaken = unit[:, None] * turned * np.sqrt(np.maximum(size, 0.0))
@@ -119,17 +116,17 @@ def _parts(evidence, hypothesis, level, left, generator, count):
     for term, columns in zip(hypothesis.terms, made, strict=True):
         coordinates = evidence.library[term.effect].coordinates
         matrix = spread(coordinates, term.legs)
-        own = drawn[start : start + matrix.shape[1]]
-        own = np.where((matrix.T @ coordinates.positive > 0)[:, None], np.maximum(own, 0.0), own)
-        part = columns.reshape(-1, columns.shape[-1]) @ own
+        values = drawn[start : start + matrix.shape[1]]
+        values = np.where((matrix.T @ coordinates.positive > 0)[:, None], np.maximum(values, 0.0), values)
+        part = columns.reshape(-1, columns.shape[-1]) @ values
         if (term.effect, term.shape) in linear.by_weight:
-            each = linear.by_weight[term.effect, term.shape].reshape(len(part), -1, len(matrix))
+            slopes = linear.by_weight[term.effect, term.shape].reshape(len(part), -1, len(matrix))
             # to first order, as both were found
             acting = matrix @ evidence.found(hypothesis.terms)[start : start + matrix.shape[1]]
-            part = part + np.einsum("nqc,c->nq", each, acting) @ drawn[len(mean) - each.shape[1] :]
+            part = part + np.einsum("nqc,c->nq", slopes, acting) @ drawn[len(mean) - slopes.shape[1] :]
         start += matrix.shape[1]
         name = _UNEXPLAINED if term.effect in UNKNOWN else term.effect
-        result[name] = result.get(name, 0.0) + left.of(part)
+        result[name] = result.get(name, 0.0) + left.residual(part)
     return result
 
 

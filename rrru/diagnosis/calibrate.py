@@ -1,4 +1,4 @@
-"""The sim without effects: as its owner believes it to be, and calibrated."""
+"""The model without effects: nominal and calibrated."""
 
 from rrru.calibration.calibrate import estimate_deviations
 from rrru.campaign import measurements as rows

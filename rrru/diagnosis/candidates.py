@@ -1,12 +1,12 @@
-"""What every single term would add to a set of terms: log evidence at all its prior scales, those of the set unchanged.
+"""Log evidence that every single term adds to a set of terms, at all its prior scales, those of the set unchanged.
 
 Once the coefficients of a set have been averaged over, the Gram matrix and the moments of all other columns are
 
     G' = G - W^T W,  g' = g - G_x a,  W = L^-1 S G_x,  L L^T = I + S G_xx S
 
 with the set's columns x, its prior deviations S and its most probable coefficients a. Each term then is a small block
-of them. Unknown loads count in the set and not in the term, and signs of the set's coefficients are those of a: it is
-for choosing sets, not for weighing them.
+of them. Errors of payload and tilt count in the set and not in the term, and signs of the set's coefficients are those
+of a: it is for choosing sets, not for weighing them.
 """
 
 from functools import cached_property
@@ -33,10 +33,10 @@ class Candidates:
 
     @cached_property
     def _blocks(self):
-        """Of the terms of few coefficients: columns' numbers (n,), ends (c + 1,), deviations (s, n), positive (n,)."""
+        """Terms of few coefficients: columns' numbers (n,), ends (c + 1,), deviations (s, n), positive (n,)."""
         few = self.terms[: len(self.terms) - len(self._broad)]
         priors = [self._evidence.priors_of((term,)) for term in few]
-        sizes = [sum(len(prior.index) for prior in own) for own in priors]
+        sizes = [sum(len(prior.index) for prior in of_term) for of_term in priors]
         if not priors:
             return (
                 np.zeros(0, dtype=int),
@@ -45,13 +45,14 @@ class Candidates:
                 np.zeros(0, dtype=bool),
             )
         scale = [
-            np.concatenate([own[0].at(prior_scale), *(prior.size for prior in own[1:])])
-            for own in priors
+            np.concatenate([of_term[0].at(prior_scale), *(prior.size for prior in of_term[1:])])
+            for of_term in priors
             for prior_scale in PRIOR_SCALES
         ]
         rows = [np.concatenate(scale[k :: len(PRIOR_SCALES)]) for k in range(len(PRIOR_SCALES))]
         numbers, positive = (
-            np.concatenate([getattr(prior, name) for own in priors for prior in own]) for name in ("index", "positive")
+            np.concatenate([getattr(prior, name) for of_term in priors for prior in of_term])
+            for name in ("index", "positive")
         )
         return numbers, np.cumsum([0, *sizes]), np.array(rows), positive
 
@@ -67,16 +68,16 @@ class Candidates:
         gram, moment, across = self._left(terms, prior_scales, level)
         few = log_evidence_of_blocks(gram, moment, across, numbers, ends, scale, positive)
         result[: len(few)] = few
-        own = None
+        present = None
         for row, term in enumerate(self.terms):
             # columns of an effect that the set has are gone
             if term.effect in taken:
                 result[row] = -np.inf
             elif row >= len(few):
                 grids = [[prior_scale] for prior_scale in prior_scales]
-                if own is None:
-                    own = evidence.over_strengths(terms, grids, [level])[0][0, 0] if terms else evidence.none[level]
-                result[row] = evidence.over_strengths((*terms, term), (*grids, PRIOR_SCALES), [level])[0][0] - own
+                if present is None:
+                    present = evidence.over_strengths(terms, grids, [level])[0][0, 0] if terms else evidence.none[level]
+                result[row] = evidence.over_strengths((*terms, term), (*grids, PRIOR_SCALES), [level])[0][0] - present
         return result
 
     def _left(self, terms, prior_scales, level):
@@ -84,9 +85,9 @@ class Candidates:
         gram, across, moment, problem, scale = self._evidence.remaining_columns(terms, prior_scales, level)
         if problem is None:
             return gram, moment, across
-        own = gram[problem.index] - across[problem.index] @ across.T
-        own = own if problem.mix is None else problem.mix.T @ own
+        shared = gram[problem.index] - across[problem.index] @ across.T
+        shared = shared if problem.mix is None else problem.mix.T @ shared
         factor = np.linalg.cholesky(scale[:, None] * problem.gram[0] * scale + np.eye(len(scale)))
-        half = solve_triangular(factor, scale[:, None] * own, lower=True, check_finite=False)
-        moment = moment - posterior_mean(problem, scale) @ own
+        half = solve_triangular(factor, scale[:, None] * shared, lower=True, check_finite=False)
+        moment = moment - posterior_mean(problem, scale) @ shared
         return gram, moment, np.ascontiguousarray(np.concatenate([across, half.T], axis=1))

@@ -1,6 +1,6 @@
-"""What a campaign can show of each effect, before anything is fitted.
+"""Detectability of each effect in a campaign, before anything is fitted.
 
-How much of it the calibration leaves, from what size on it is found, and which other effect could stand in for it.
+It gives the share that the calibration does not absorb, the smallest detectable size, and the confounded effect.
 """
 
 from dataclasses import replace
@@ -11,28 +11,28 @@ from scipy.special import chdtri, chndtrinc
 
 from rrru.diagnosis.options import OPTIONS
 
-_HIDDEN = "the calibration takes it up entirely on these points"
-_UNKNOWN = {"visible_share": np.nan, "detectable_mm": np.nan, "imitated_by": "", "imitated_share": np.nan}
+_HIDDEN = "cannot be separated from the geometric parameters at these poses"
+_NO_RESULT = {"visible_share": np.nan, "detectable_mm": np.nan, "imitated_by": "", "imitated_share": np.nan}
 
 
 def detectability(case, linear):
-    """Rows of `gap_identifiability` without the campaign, from the linearised sim without effects."""
+    """Rows of `gap_identifiability` without the campaign, from the linearised model without effects."""
     base, _ = np.linalg.qr(linear.base.reshape(3 * len(case), -1))
     visible = {name: _visible(case, linear, base, name) for name in case.effects}
     bases = {name: _basis(columns) for name, (_, columns) in visible.items()}
     rows = [{"effect": name, **_row(case, name, *visible[name], bases)} for name in case.effects]
-    rows += [{"effect": name, "testable": False, **_UNKNOWN, "note": note} for name, note in case.untestable.items()]
+    rows += [{"effect": name, "testable": False, **_NO_RESULT, "note": note} for name, note in case.untestable.items()]
     return pd.DataFrame(rows)
 
 
 def with_seen(case, linear):
-    """The case without effects that even at their largest the calibration would hide, and the linearisation of it."""
+    """The case without effects that the calibration would absorb even at their largest, and its linearisation."""
     base, _ = np.linalg.qr(linear.base.reshape(3 * len(case), -1))
     hidden = {}
     for name, effect in case.effects.items():
         largest = float(np.min(effect.coordinates.most / effect.coordinates.typical))
-        own = float(np.linalg.norm(_visible(case, linear, base, name)[1]))
-        if largest * own < case.noise_mm * np.sqrt(_needed(1)):
+        visible = float(np.linalg.norm(_visible(case, linear, base, name)[1]))
+        if largest * visible < case.noise_mm * np.sqrt(_needed(1)):
             hidden[name] = _HIDDEN
     library = {name: effect for name, effect in case.library.items() if name not in hidden}
     columns = {key: column for key, column in linear.columns.items() if key[0] in library}
@@ -46,7 +46,7 @@ def _needed(freedom):
 
 
 def _visible(case, linear, base, name):
-    """Columns (3n, k) of an effect, all shapes, per typical size, with and without what a basis (3n, p) takes up."""
+    """Columns (3n, k) of an effect, all shapes, per typical size, with and without their part in a basis (3n, p)."""
     coordinates = case.library[name].coordinates
     parts = [linear.columns[name, shape].reshape(3 * len(case), -1) for shape in range(len(coordinates.shapes))]
     raw = np.concatenate([part * coordinates.typical for part in parts], axis=1)
@@ -61,16 +61,17 @@ def _basis(columns):
 
 def _row(case, name, raw, visible, bases):
     """The row of one testable effect; raw, visible: its columns (3n, k) with and without the calibration's part."""
-    own, total = float((visible**2).sum()), float((raw**2).sum())
-    share = np.sqrt(own / total) if total > 0.0 else 0.0
-    row = {"testable": True, **_UNKNOWN, "visible_share": share, "note": ""}
+    square, total = float((visible**2).sum()), float((raw**2).sum())
+    share = np.sqrt(square / total) if total > 0.0 else 0.0
+    row = {"testable": True, **_NO_RESULT, "visible_share": share, "note": ""}
     if share < OPTIONS.min_visible_rms_share:
         return row | {"testable": False, "note": _HIDDEN}
     first = visible[:, : len(case.library[name].coordinates)]
     freedom = np.linalg.matrix_rank(first, tol=1e-6 * np.linalg.norm(first))
     row["detectable_mm"] = float(case.noise_mm * np.sqrt(_needed(freedom) / len(case)))
-    imitated = {other: float(((basis.T @ visible) ** 2).sum() / own) for other, basis in bases.items() if other != name}
-    if imitated:
-        best = max(imitated, key=imitated.get)
-        row |= {"imitated_by": best, "imitated_share": min(imitated[best], 1.0)}
+    others = {other: basis for other, basis in bases.items() if other != name}
+    shares = {other: float(((basis.T @ visible) ** 2).sum() / square) for other, basis in others.items()}
+    if shares:
+        best = max(shares, key=shares.get)
+        row |= {"imitated_by": best, "imitated_share": min(shares[best], 1.0)}
     return row

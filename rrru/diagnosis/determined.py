@@ -35,7 +35,7 @@ def require_determined(case, whose=""):
     if not few:
         return case
     library = {name: effect for name, effect in case.library.items() if name not in few}
-    # an unknown function is no effect of the library and needs no reason
+    # a discrepancy function is no effect of the library and needs no reason
     reasons = {name: reason for name, reason in few.items() if name in case.effects}
     known = {name: points for name, points in case.known.items() if name not in few}
     return replace(case, library=library, untestable=case.untestable | reasons, known=known)

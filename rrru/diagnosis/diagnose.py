@@ -1,4 +1,4 @@
-"""The diagnosis of one campaign: where its gap lies, what causes it, how far it shrinks, what to measure next."""
+"""The diagnosis of one campaign: variance by factor, causes, explained fraction and what to measure next."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
@@ -20,8 +20,8 @@ from rrru.diagnosis.inference import (
     InferenceResult,
     infer,
     with_arm,
-    with_beside,
     with_effects,
+    with_world_scale,
 )
 from rrru.diagnosis.left_out import left_out, left_out_note
 from rrru.diagnosis.make_problem import make_case
@@ -30,7 +30,14 @@ from rrru.diagnosis.omitted_variable_bias import bias_notes
 from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.posterior import Posterior
 from rrru.diagnosis.remainder import NO_REMAINDER, followed_alike, remainder_rows
-from rrru.diagnosis.result_notes import fit_notes, noise_notes, posterior_notes, weight_doubts, weight_notes, zero_notes
+from rrru.diagnosis.result_notes import (
+    fit_notes,
+    noise_notes,
+    payload_notes,
+    posterior_notes,
+    undetermined_payload_notes,
+    zero_notes,
+)
 from rrru.diagnosis.result_tables import details_of, parameter_rows, where
 from rrru.diagnosis.settings import GapSettings, Prior
 from rrru.diagnosis.shrink import CLOSED, order_by_share, share_closed, shrink_steps
@@ -52,9 +59,9 @@ class MeasuredRobot:
     """What is known of the robot that a campaign was measured on.
 
     mechanism: its nominal one; masses: `rrru.kinematics.dynamics.Masses`; noise_mm: of the instrument, per axis, None
-    or 0 where nobody states it, and noise_rad: of the orientations that it reads; noise_known: noise_mm is no guess
-    within 30 % but right; campaign: name of the campaign, for its random stream; limits: what further runs may ask of
-    it.
+    or 0 where it is not stated, and noise_rad: of the orientations that it reads; noise_known: noise_mm is exact,
+    not a guess within 30 %; campaign: name of the campaign, for its random stream; limits: of
+    further runs.
     """
 
     mechanism: Robot
@@ -69,7 +76,7 @@ class MeasuredRobot:
 @dataclass(frozen=True)
 class Diagnosis:
     """verdict: mapping of `gap_verdicts` without the campaign; tables: frames by name, without the campaign; state: the
-    corrected sim; inference: everything that the search found; decided: the Verdict itself.
+    corrected model; inference: the result of the search; decided: the Verdict itself.
     """
 
     verdict: dict[str, Any]
@@ -80,7 +87,7 @@ class Diagnosis:
 
 
 def sim(mechanism: Any) -> Any:
-    """The mechanism with bounds wide enough for a gap to show itself in the deviations."""
+    """The mechanism with bounds wide enough for a gap to appear in the deviations."""
     return mechanism.widened(OPTIONS.parameter_bound_rad, OPTIONS.parameter_bound_mm)
 
 
@@ -89,8 +96,8 @@ def diagnose(
 ) -> Diagnosis:
     """Diagnosis of a measurement table of a MeasuredRobot.
 
-    details: also the tables that tell more than the verdict, its budget and numbers and what to measure next. Raises
-    FitError where the readings do not determine the calibration with some to spare, see `rrru.diagnosis.determined`.
+    details: also the tables beyond the verdict, its budget and parameters and what to measure next. Raises FitError
+    where the readings do not determine the calibration with some to spare, see `rrru.diagnosis.determined`.
     """
     library = settings.library(robot.mechanism)
     stated = (KNOWN if robot.noise_known else STATED) if robot.noise_mm else UNKNOWN_NOISE
@@ -101,7 +108,7 @@ def diagnose(
     case = require_determined(case, f"campaign {robot.campaign}: " if robot.campaign else "")
     if rows.has_turns(measurements):
         case = with_arm(case, robot.noise_mm, robot.noise_rad)
-    case = with_beside(case)
+    case = with_world_scale(case)
     generator = stream(settings.seed, "gap", robot.campaign)
     verdict, inference, ordered = _decide(infer(case, settings.prior, stated), settings.prior)
     if why := why_no_answer(inference, robot.noise_mm):
@@ -109,8 +116,8 @@ def diagnose(
     steps = shrink_steps(inference, [term for term, _ in ordered], generator, settings.draws)
     case = inference.case
     residual = case.residual(inference.calibrated)
-    own = stream(settings.seed, "gap budget", robot.campaign)
-    parts = budget(inference, robot.noise_mm or None, own, settings.draws)
+    budget_generator = stream(settings.seed, "gap budget", robot.campaign)
+    parts = budget(inference, robot.noise_mm or None, budget_generator, settings.draws)
     sizes = parts[parts["kind"] == "effect"].set_index("part")["rms_mm"].to_dict()
     further = advise(inference, verdict, robot.masses, robot.limits, sizes)
     worst = worst_spot(case.motion.position_mm[case.at][case.on_robot], residual[case.on_robot])
@@ -128,11 +135,11 @@ def diagnose(
 
 
 def _found(inference: InferenceResult) -> Iterator[str]:
-    """What a user has to know of the robot beside its effects."""
+    """Notes on what was found of the robot in addition to its effects."""
     yield from zero_notes(inference.fit.estimate, inference.case.mechanism)
     yield from bias_notes(inference)
-    yield from weight_notes(inference)
-    yield from weight_doubts(inference)
+    yield from payload_notes(inference)
+    yield from undetermined_payload_notes(inference)
 
 
 def _notes(inference: InferenceResult, stated_mm: float | None, excluded: pd.DataFrame) -> Iterator[str]:
@@ -164,10 +171,13 @@ def _row(
     steps: Sequence,
     worst_mm: np.ndarray,
     further: Advice,
-    told: tuple[float | None, pd.DataFrame],
+    noise_and_excluded: tuple[float | None, pd.DataFrame],
 ) -> dict:
-    """The row of `gap_verdicts` without the campaign; told: the stated noise in mm and the rows of `gap_left_out`."""
-    stated_mm, excluded = told
+    """The row of `gap_verdicts` without the campaign.
+
+    noise_and_excluded: the stated noise in mm and the rows of `gap_left_out`.
+    """
+    stated_mm, excluded = noise_and_excluded
     found = [] if verdict.no_answer else _found(inference)
     case, noise = inference.case, inference.case.noise or NoiseModel.white(inference.case.noise_mm)
     return {
@@ -204,9 +214,10 @@ def _row(
 def _decide(inference: InferenceResult, prior: Prior) -> tuple[Verdict, InferenceResult, tuple]:
     """Verdict, the inference fitted to it, and its terms with their shares in order.
 
-    The probabilities come from the evidence; prediction has a veto: an effect that makes left-out points worse than the
-    verdict without it does, by more than chance, is ruled out and the rest decides again. Beside something unexplained,
-    a part of which it may be, an effect has to make them better, and by more than a small part of the gap to be named.
+    The probabilities come from the evidence, and cross-validation has a veto. An effect that predicts left-out points
+    worse than the verdict without it, by more than chance, is ruled out, and the others are decided again. Where
+    something is unexplained an effect may be a part of that: it has to predict them better, and to make more than a
+    small part of the gap, to be named.
     """
     ruled_out: set[str] = set()
     small: frozenset[str] = frozenset()
@@ -217,7 +228,7 @@ def _decide(inference: InferenceResult, prior: Prior) -> tuple[Verdict, Inferenc
         worse = {name for name, gain in _gains(fitted).items() if gain < least}
         if not worse:
             ordered = order_by_share(fitted)
-            # decided once, with all effects fitted: one that is left out would be a part of the remainder
+            # decided once, with all effects fitted: an effect that is left out would be a part of the remainder
             if not small and (small := _small(fitted, {term.effect: share for term, share in ordered}, verdict)):
                 continue
             return replace(verdict, effects=tuple(term.effect for term, _ in ordered)), fitted, ordered
@@ -227,8 +238,8 @@ def _decide(inference: InferenceResult, prior: Prior) -> tuple[Verdict, Inferenc
 
 def _small(inference: InferenceResult, shares: dict[str, float], verdict: Verdict) -> frozenset[str]:
     """Effects of a verdict that may be a part of the remainder; shares: of the gap, of each effect."""
-    # shares are of positions on the robot: reflectors elsewhere may show what hardly moves these
-    if not verdict.unexplained or inference.case.beside.any():
+    # shares are of positions on the robot: reflectors elsewhere may show effects that hardly move these
+    if not verdict.unexplained or inference.case.on_world.any():
         return frozenset()
     found = {name for name, share in shares.items() if share < OPTIONS.min_share_with_unexplained}
     residual = inference.case.residual(inference.calibrated)[inference.case.on_robot]
@@ -239,16 +250,16 @@ def _small(inference: InferenceResult, shares: dict[str, float], verdict: Verdic
 
 
 def _without(inference: InferenceResult, ruled_out: set[str], worse: set[str], prior: Prior) -> Posterior:
-    """The posterior without effects that have just been found worse, and all that have been ruled out.
+    """The posterior without effects that have just been found worse, and without all that have been ruled out.
 
-    Where every likely set holds one of them, others are looked for.
+    Where every likely set holds one of them, the search is repeated without them.
     """
-    beliefs = inference.posterior
-    rest = beliefs
+    posterior = inference.posterior
+    remaining = posterior
     for name in worse:
-        rest = rest.without(name)
-    if rest.height > beliefs.height - OPTIONS.negligible_nats:
-        return rest
+        remaining = remaining.without(name)
+    if remaining.height > posterior.height - OPTIONS.negligible_nats:
+        return remaining
     evidence = inference.evidence.on_library()
     return explore(evidence, prior, ruled_out)
 

@@ -1,8 +1,8 @@
-"""What a gap may look like that no law of the library makes: smooth functions with many free coefficients each.
+"""Basis of the model discrepancy: smooth functions with many free coefficients each.
 
-They compete with the library on the same data. A law that acts has few numbers and wins; where one of these wins, the
-gap follows the drives, the time, the place or the load in a way that the library does not hold, and the verdict says
-"unexplained".
+They compete with the library on the same data. An effect that acts has few parameters and wins. Where a function wins,
+the gap depends on the drives, the time, the place or the load in a way that the library does not hold. The verdict then
+is "unexplained".
 """
 
 from dataclasses import dataclass, replace
@@ -43,13 +43,13 @@ class Unknown:
         """Changes under coefficients (drives or axes times k,)."""
         coefficients = np.reshape(values, (-1, self.count))
         if self.per_leg:
-            functions = self._once(motion, lambda: np.stack([self.basis(drive) for drive in motion.drive.T], axis=1))
+            functions = self._cached(motion, lambda: np.stack([self.basis(drive) for drive in motion.drive.T], axis=1))
             return motion.at_drives(np.einsum("nlk,lk->nl", functions, coefficients))
-        shift = self._once(motion, lambda: self.basis(motion)) @ coefficients.T
+        shift = self._cached(motion, lambda: self.basis(motion)) @ coefficients.T
         return motion.at({WORLD: np.concatenate([shift, np.zeros_like(shift)], axis=1)})
 
-    def _once(self, motion, make):
-        """The functions along a motion, made once."""
+    def _cached(self, motion, make):
+        """The functions along a motion, computed once."""
         if self.name not in motion.cache:
             motion.cache[self.name] = make()
         return motion.cache[self.name]
@@ -99,7 +99,7 @@ UNKNOWN = {
         Unknown("unknown_load", "the payload", _of_load, 10, ("payload_kg",)),
     )
 }
-# what an error of a drive may typically be, and so the function of its value
+# typical size of an error of a drive, and so of a function of its value
 _TYPICAL = {"rad": 1e-4, "mm": 0.01}
 
 

@@ -1,8 +1,8 @@
-"""Errors of the drives over their own values: what the effects of a verdict make of every drive, and where most.
+"""Errors of the drives over their own values by the effects of a verdict, and where they are largest.
 
-Of a law that depends on the drive's value alone the error e(q) is drawn over the measured range, minus its mean there:
-a constant is the drive's zero, which the calibration has. With the derivatives s(q) of e(q) by the effect's numbers and
-their covariance C the 95 % band is e(q) +- 1.96 sqrt(s(q)^T C s(q)).
+The error e(q) of an effect that depends on the drive's value alone is tabulated over the measured range, minus its mean
+there: a constant is the drive's zero, which the calibration has. With the derivatives s(q) of e(q) by the effect's
+numbers and their covariance C the 95 % band is e(q) +- 1.96 sqrt(s(q)^T C s(q)).
 """
 
 from dataclasses import replace
@@ -14,7 +14,7 @@ from rrru.diagnosis.result_tables import value_steps
 from rrru.diagnosis.terms import spread
 from rrru.estimation.intervals import QUANTILE_95
 
-# places of a drive's range: a wave of 200 a turn still has three and more
+# places of a drive's range: a wave of 200 per turn still has three and more
 _PLACES = 721
 _COLUMNS = ("effect", "drive", "name", "unit", "drive_value", "error", "low_95", "high_95", "worst")
 
@@ -57,16 +57,16 @@ def _of_drive(case, fit, term, drive):
 
 
 def _linear(case, fit, term, at):
-    """Error (n,) of a drive minus its mean, and its slopes (n, k) by a term's free numbers; the law is linear in them.
+    """Error (n,) of a drive minus its mean, and its slopes (n, k) by a term's free coefficients, in which it is linear.
 
     at: the Motion at n places of the drive's range, and the drive's number.
     """
     motion, drive = at
     made = case.library[term.effect].along_drives(motion)
-    ends = np.cumsum([0, *(own.shape[1] for own in made)])
+    ends = np.cumsum([0, *(functions.shape[1] for functions in made)])
     slopes = np.zeros((len(motion), ends[-1]))
-    own = slice(ends[drive], ends[drive + 1])
-    slopes[:, own] = made[drive] - made[drive].mean(axis=0)
+    of_drive = slice(ends[drive], ends[drive + 1])
+    slopes[:, of_drive] = made[drive] - made[drive].mean(axis=0)
     free = slopes @ spread(case.library[term.effect].coordinates, term.legs)
     return slopes @ fit.state.effects[term.effect, term.shape], free
 

@@ -1,9 +1,9 @@
-"""Errors of the drives by their angle: which sharp waves a campaign shows, and how rough a function is.
+"""Errors of the drives by their angle: which harmonics a campaign shows, and how rough a function is.
 
-Both look at what the calibration, and known effects beside it, leave. Waves are found one after another (matching
-pursuit), each the drive and order that take most off the sum of squares; the next has its place where it takes off more
-than what choosing it among all resolved ones costs. The spectrum of a function is the one of highest likelihood, its
-size and the noise chosen with it.
+Both are estimated from the residuals of the calibration and the known effects. Harmonics are found one after another
+(matching pursuit): each has the drive and order that reduce the sum of squares most. The next one is added where it
+reduces that by more than the cost of choosing it among all resolved ones. The spectrum of a function is the one of
+highest likelihood, its size and the noise chosen with it.
 """
 
 from dataclasses import replace
@@ -23,20 +23,20 @@ from rrru.effects.harmonic import waves
 def with_spectra(case, linear, terms):
     """The case whose waves are found and whose spectra are chosen, of effects that no term holds; and keys of these.
 
-    linear: about the state that the terms of a hypothesis, fitted beside them, have led to.
+    linear: about the state of a hypothesis, whose terms are fitted together with them.
     """
     library, held = dict(case.library), {term.effect for term in terms}
-    open_ones = [e for e in library.values() if (e.coordinates.spectra or _waits(e)) and e.name not in held]
+    open_ones = [e for e in library.values() if (e.coordinates.spectra or _is_pending(e)) and e.name not in held]
     if not open_ones:
         return case, []
-    # a rough function of the drives' values holds all waves: beside it none would be left to stand for it
+    # a rough function of the drives' values contains all harmonics: together with it none would be left
     known = [term for term in terms if term.effect not in UNKNOWN and not library[term.effect].coordinates.broad]
-    beside = np.concatenate([linear.base, *signatures(library, linear, known)], axis=-1)
-    basis, _ = np.linalg.qr(beside.reshape(linear.data.size, -1))
+    nuisance = np.concatenate([linear.base, *signatures(library, linear, known)], axis=-1)
+    basis, _ = np.linalg.qr(nuisance.reshape(linear.data.size, -1))
     data = _without(linear.data.reshape(-1, 1), basis)[:, 0]
     changed = []
     for effect in open_ones:
-        if _waits(effect):
+        if _is_pending(effect):
             found = pursue(data, basis, linear.drive, case.motion.drive[case.at])
             if found[0]:
                 library[effect.name] = effect.with_waves(*found)
@@ -48,14 +48,14 @@ def with_spectra(case, linear, terms):
         columns = _without(linear.columns[effect.name, 0].reshape(len(data), -1), basis)
         best, prior_scale = likeliest(data, columns, effect.coordinates.spectra, basis.shape[1])
         typical = prior_scale * effect.coordinates.spectra[best]
-        # one of several, chosen by the data
-        paid = effect.coordinates.log_prior - np.log(len(effect.coordinates.spectra))
-        chosen = replace(effect.coordinates, typical=typical, spectra=(), sized=True, log_prior=paid)
+        # the prior pays for the choice among several by the data
+        log_prior = effect.coordinates.log_prior - np.log(len(effect.coordinates.spectra))
+        chosen = replace(effect.coordinates, typical=typical, spectra=(), sized=True, log_prior=log_prior)
         library[effect.name] = replace(effect, coordinates=chosen)
     return replace(case, library=library), changed
 
 
-def _waits(effect):
+def _is_pending(effect):
     """Whether an effect's waves are still to be found."""
     return getattr(effect, "with_waves", None) is not None
 
@@ -68,8 +68,8 @@ def _without(columns, basis):
 def pursue(data, basis, drive_effect, drive):
     """Pairs (drive, order) of the waves that stand out in data (m,), and the log prior of having chosen just these.
 
-    basis (m, b): what is fitted beside them; drive_effect (n, 3, K): derivative by the actuator values; drive (n, K):
-    these in rad.
+    basis (m, b): columns that are fitted together with them; drive_effect (n, 3, K): derivative by the actuator values;
+    drive (n, K): these in rad.
     """
     reach = np.ptp(drive, axis=0)
     atoms = [(k, order) for k in range(drive.shape[1]) for order in _orders(reach[k])]
@@ -81,12 +81,13 @@ def pursue(data, basis, drive_effect, drive):
         return _without(_waves_of(drive_effect, drive, k, orders), basis)
 
     every = np.concatenate([columns(k, _orders(reach[k])) for k in range(drive.shape[1])], axis=1)
-    # what the calibration takes up is none
+    # a harmonic that the calibration absorbs does not count
     least = OPTIONS.min_free_wave_length_ratio * np.linalg.norm(every, axis=0).max()
     unit = _unit(every, least)
     resolved = max(sum(OPTIONS.max_spectrum_order * span / (2.0 * np.pi) for span in reach), 1.0)
     price, freedom = np.log(resolved) + np.log(len(data)), max(len(data) - basis.shape[1], 0)
-    found, had, left = [], np.zeros((len(data), 0)), data  # had: an orthonormal basis of the waves found
+    # waves_found: an orthonormal basis of the harmonics found
+    found, waves_found, left = [], np.zeros((len(data), 0)), data
     while len(found) < min(OPTIONS.max_spectrum_waves, len(data) // OPTIONS.min_numbers_per_spectrum_wave):
         gains = ((unit.T @ left) ** 2).reshape(-1, 2).sum(axis=1)
         if not gains.any():
@@ -94,21 +95,23 @@ def pursue(data, basis, drive_effect, drive):
         k, middle = atoms[int(gains.argmax())]
         step = 2.0 * np.pi / reach[k] / OPTIONS.spectrum_orders_per_resolution
         wave = partial(lambda k, order: _unit(columns(k, np.array([order])), least), k)
-        order = _sharpest(left, had, wave, middle, step)
-        added = _beside(had, wave(order))
+        order = _sharpest(left, waves_found, wave, middle, step)
+        added = _orthogonal_to(waves_found, wave(order))
         trial = _without(left, added)
         if 0.5 * freedom * np.log((left @ left) / (trial @ trial)) < price:
             break
         found.append((k, order))
-        had, left = np.concatenate([had, added], axis=1), trial
+        waves_found, left = np.concatenate([waves_found, added], axis=1), trial
         # what is nearer than that is the same wave
         same = [drive == k and abs(one - order) < step for drive, one in atoms]
         unit[:, np.repeat(same, 2)] = 0.0
     return tuple(found), float(gammaln(len(found) + 1) - len(found) * np.log(resolved))
 
 
-def _sharpest(left, had, wave, middle, step):
-    """The order about the middle whose wave, from orders to columns (m, 2), takes most off what others leave (m,).
+def _sharpest(left, found, wave, middle, step):
+    """The order about the middle whose wave reduces the residuals (m,) of the others most.
+
+    found (m, h): orthonormal basis of the harmonics found; wave: from orders to columns (m, 2).
 
     A wave between two orders of the grid, which lie a step apart, would else be taken for both of them.
     """
@@ -116,15 +119,15 @@ def _sharpest(left, had, wave, middle, step):
     bounds = max(middle - shift, lowest), min(middle + shift, OPTIONS.max_spectrum_order)
 
     def cost(order):
-        return -float(((_beside(had, wave(order)).T @ left) ** 2).sum())
+        return -float(((_orthogonal_to(found, wave(order)).T @ left) ** 2).sum())
 
     return float(minimize_scalar(cost, bounds=bounds, method="bounded").x)
 
 
-def _beside(had, columns):
-    """An orthonormal basis (m, r) of what columns (m, c) add to the orthonormal ones had (m, h)."""
-    # once more for what rounding has left
-    basis, size, _ = np.linalg.svd(_without(_without(columns, had), had), full_matrices=False)
+def _orthogonal_to(found, columns):
+    """An orthonormal basis (m, r) of what columns (m, c) add to orthonormal ones found (m, h)."""
+    # twice, against rounding
+    basis, size, _ = np.linalg.svd(_without(_without(columns, found), found), full_matrices=False)
     return basis[:, size > OPTIONS.min_new_wave_length]
 
 
@@ -137,7 +140,7 @@ def _unit(columns, least):
 def amplitudes(case, state, orders):
     """Amplitudes (K, g) in rad of waves of orders (g,) of each drive that fit what a state leaves, one at a time.
 
-    The calibration's numbers are fitted beside each; NaN where they take up all but a hundredth of a wave.
+    The calibration's parameters are fitted together with each; NaN where they absorb more than 99 % of a wave.
     """
     linear, drive = case.linearise(State(state.deviations, {}), []), case.motion.drive[case.at]
     basis, _ = np.linalg.qr(linear.base.reshape(linear.data.size, -1))
@@ -148,8 +151,8 @@ def amplitudes(case, state, orders):
         pairs, moments = columns.reshape(len(left), -1, 2), (columns.T @ left).reshape(-1, 2)
         grams = np.einsum("mgi,mgj->gij", pairs, pairs)
         squares = (whole**2).sum(axis=0).reshape(-1, 2).mean(axis=1)
-        told = np.linalg.eigvalsh(grams)[:, 0] > OPTIONS.min_free_wave_share * squares
-        found[told] = np.linalg.norm(np.linalg.solve(grams[told], moments[told, :, None])[:, :, 0], axis=1)
+        free = np.linalg.eigvalsh(grams)[:, 0] > OPTIONS.min_free_wave_share * squares
+        found[free] = np.linalg.norm(np.linalg.solve(grams[free], moments[free, :, None])[:, :, 0], axis=1)
     return result
 
 
@@ -170,7 +173,8 @@ def _waves_of(drive_effect, drive, k, orders):
 def likeliest(data, columns, spectra, fitted):
     """Number of the spectrum of highest likelihood and the factor of its sizes: of data (m,) and columns (m, c).
 
-    spectra: sizes (c,) of the coefficients up to a common factor; fitted: numbers fitted beside them.
+    spectra: sizes (c,) of the coefficients up to a common factor; fitted: number of parameters fitted together with
+    them.
     """
     gram, moment, square = columns.T @ columns, columns.T @ data, float(data @ data)
     found = [
@@ -183,8 +187,8 @@ def likeliest(data, columns, spectra, fitted):
 def _likeliest_factor(gram, moment, square, count):
     """Highest log likelihood over the factor of all coefficients, and that factor.
 
-    Of a sum of squares with so many degrees of freedom, a Gram matrix (c, c) and moments (c,) of columns of unit
-    coefficients. For each ratio of factor and noise the likeliest noise is known.
+    square: sum of squares with so many degrees of freedom; gram (c, c), moment (c,): of columns of unit coefficients.
+    For each ratio of factor and noise the likeliest noise is known.
     """
     value, turned = np.linalg.eigh(gram)
     value, power = np.maximum(value, 0.0), (turned.T @ moment) ** 2

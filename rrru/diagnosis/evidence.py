@@ -1,21 +1,23 @@
-"""How well a hypothesis predicts the data, all its numbers averaged out: the marginal likelihood of linear models.
+"""Evidence of a hypothesis: the marginal likelihood of a linear model, all its parameters averaged out.
 
 Along each run the data d (one axis, k points) are
 
     d = B b + X c + w + e,   w ~ N(0, level^2 sigma^2 K),   c ~ N(0, (prior_scale sigma)^2 S)
 
-with noise e as in `rrru.estimation.noise_model`, of mean variance sigma^2, the geometric errors b (weak prior), the
-effects' coefficients c, and a discrepancy w for whatever the library does not hold: K is diagonal in the cosine basis
-of the run and falls with the frequency, so that w is smooth along the path, plus a small part that is not (Kennedy and
-O'Hagan, Bayesian calibration of computer models, 2001). S is scaled so that `prior_scale` is the rms of the effect's
-part of the gap per axis over sigma, the calibration's share taken out; positive coefficients have the positive half of
-it. Strengths are averaged over a grid, even in their logarithm; none makes a prior wider than its law's largest size.
+with noise e as in `rrru.estimation.noise_model`, of mean variance sigma^2, the geometric errors b (weak prior) and the
+effects' coefficients c. The model discrepancy w is for whatever the library does not hold (Kennedy and O'Hagan,
+Bayesian calibration of computer models, 2001). K is diagonal in the cosine basis of the run and falls with the
+frequency. So w is smooth along the path, plus a small part that is not. S is scaled so that `prior_scale` is the rms of
+the effect's part of the gap per axis over sigma, the calibration's share taken out; positive coefficients have the
+positive half of it. Prior scales are averaged over a grid, even in their logarithm. None makes a prior wider than the
+upper bound of the effect.
 
-A law's shape parameters may be off the grid on which they were tried: each has a coefficient N(0, 1) on
-`Linear.shape_columns`, and so has the weight wherever a law bears loads (`rrru.diagnosis.payload_nuisance`).
+The shape parameters of an effect may lie between the points of their grid: each has a coefficient N(0, 1) on
+`LinearizedProblem.shape_columns`. So have payload and tilt wherever a compliant effect acts
+(`rrru.diagnosis.payload_nuisance`).
 
-An effect may lack what it needs at some readings, such as the sense in which a drive arrives: it says nothing about
-them. All sets of effects then compare on the readings at which every effect of the library has what it needs
+An effect may lack its inputs at some readings, such as the sense in which a drive arrives: it predicts nothing there.
+All sets of effects then compare on the readings at which every effect of the library has what it needs
 (`ModelEvidence.on_library`); coefficients of a set are those of the readings at which its own effects do.
 """
 
@@ -30,7 +32,14 @@ from rrru.diagnosis.evidence_kernels import log_sum_exp
 from rrru.diagnosis.marginal import Average, averaged_mean
 from rrru.diagnosis.marginal_problem import MarginalProblem, Prior
 from rrru.diagnosis.options import OPTIONS
-from rrru.diagnosis.payload_nuisance import WEIGHT, as_found, borne, gained_over_cases, mean_over_cases, over_cases
+from rrru.diagnosis.payload_nuisance import (
+    WEIGHT,
+    as_found,
+    gained_over_cases,
+    mean_over_cases,
+    over_cases,
+    with_nuisance,
+)
 from rrru.diagnosis.terms import EACH, SAME, spread
 from rrru.diagnosis.whitened import DISCREPANCY_SCALES, Whitened
 from rrru.estimation.noise_model import NoiseModel
@@ -53,9 +62,9 @@ class ModelEvidence:
     """Evidence of sets of terms on one linearisation.
 
     library: effects by name; linear: `rrru.diagnosis.state.LinearizedProblem`; run (n,): the series of each row; noise:
-    a NoiseModel; smooth: whether a discrepancy can be smooth along the runs: of poses in no order none is; known:
-    effect to the rows (n,) at which it has all that it needs, of effects that lack something somewhere. Numbers of sets
-    with such effects are those of the rows at which all of them do.
+    a NoiseModel; smooth: whether a discrepancy can be smooth along the runs, not so for poses in no order; known:
+    effect to the rows (n,) at which it has all that it needs, of effects that lack something somewhere. Results for
+    sets with such effects are those of the rows at which all of them do.
     """
 
     library: dict
@@ -126,10 +135,10 @@ class ModelEvidence:
             power, total = (
                 (all_of[index] * size**2).sum() / (3.0 * len(self)) for all_of in (gram, self._whitened.whole)
             )
-            # of what the calibration takes up, rounding is left: it must not be blown up to the size of an effect
+            # rounding is left of what the calibration absorbs: it must not be scaled up to the size of an effect
             unit = np.sqrt(max(power, OPTIONS.min_visible_share * total, 1e-30))
             if coordinates.sized:
-                # of many coefficients the data tell the size far better than the prior scales lie apart: one is just it
+                # the data determine the size of many coefficients better than the grid resolves: one scale is just it
                 unit = PRIOR_SCALES[np.abs(np.log(PRIOR_SCALES / unit)).argmin()]
             size /= unit
             most = np.broadcast_to(coordinates.most, len(coordinates))
@@ -149,15 +158,16 @@ class ModelEvidence:
 
     @_on_complete
     def found(self, terms):
-        """Coefficients (k,) of a set of terms under weak priors, which the weight's columns are made with."""
+        """Coefficients (k,) of a set of terms under weak priors, which make the columns of payload and tilt."""
         terms = tuple(terms)
         made, found = self._found.of(frozenset(terms), lambda: (terms, as_found(*self._weakly(terms))))
         return found if made == terms else found[self._order(made, terms)]
 
     def _weakly(self, terms):
         """The MarginalProblem of terms alone at one level, and weak prior_scales (1, terms)."""
-        # whatever levels are asked for, it is one weight
-        return self._bare(terms, partial(self._grams, self.levels[:1])), np.full((1, len(terms)), PRIOR_SCALES[-1])
+        # payload and tilt are the same at all levels
+        problem = self._without_nuisance(terms, partial(self._grams, self.levels[:1]))
+        return problem, np.full((1, len(terms)), PRIOR_SCALES[-1])
 
     def _order(self, made, terms):
         """Numbers (k,) that coefficients of terms, and after them of their shapes, have in a set in another order."""
@@ -177,20 +187,21 @@ class ModelEvidence:
 
     def _projected(self, terms, levels):
         if not self._blocks(terms):
-            return self._bare(terms, partial(self._grams, levels))
-        return self._borne(terms, levels, self.found(terms))
+            return self._without_nuisance(terms, partial(self._grams, levels))
+        return self._with_nuisance(terms, levels, self.found(terms))
 
-    def _borne(self, terms, levels, found):
-        """The MarginalProblem of terms and of the weight, whose columns are made with coefficients found (k,)."""
+    def _with_nuisance(self, terms, levels, found):
+        """The MarginalProblem of terms, payload and tilt, whose columns are made with coefficients found (k,)."""
         grams, blocks = partial(self._grams, levels), self._blocks(terms)
-        return borne(self._bare(terms, grams), len(terms), blocks, self.linear.weight_steps, found, grams)
+        problem = self._without_nuisance(terms, grams)
+        return with_nuisance(problem, len(terms), blocks, self.linear.weight_steps, found, grams)
 
-    def _bare(self, terms, grams):
-        """The MarginalProblem of terms without the weight."""
+    def _without_nuisance(self, terms, grams):
+        """The MarginalProblem of terms without payload and tilt."""
         return MarginalProblem.of(self.priors_of(terms), len(terms), grams)
 
     def _blocks(self, terms):
-        """`_by_weight` of the terms that give way, by their number."""
+        """`_by_weight` of the compliant terms, by their number."""
         return {k: self._by_weight(t) for k, t in enumerate(terms) if (t.effect, t.shape) in self.linear.by_weight}
 
     def _grams(self, levels, index):
@@ -199,7 +210,7 @@ class ModelEvidence:
         return map(np.array, zip(*((g[index[:, None], index], m[index]) for g, m, _ in grams), strict=True))
 
     def _by_weight(self, term):
-        """The matrix from a term's coefficients to coordinates, and the columns that the weight makes of these's."""
+        """Matrix from a term's coefficients to coordinates, and derivatives of its columns by payload and tilt."""
         numbers = self._whitened.layout[0][term.effect, term.shape, WEIGHT]
         matrix = spread(self.library[term.effect].coordinates, term.legs)
         return matrix, numbers.reshape(-1, len(matrix))
@@ -219,10 +230,10 @@ class ModelEvidence:
             none = np.array([self._whitened.gram(level)[2] for level in levels])
             found = gained_over_cases(self.projected(terms, levels), combinations)
             return none[:, None] + found, combinations
-        rest, others = (*terms[:broad], *terms[broad + 1 :]), (*grids[:broad], *grids[broad + 1 :])
+        narrow, others = (*terms[:broad], *terms[broad + 1 :]), (*grids[:broad], *grids[broad + 1 :])
         rows = np.array(list(product(*others)))
-        problem = self.projected(rest, levels) if rest else None
-        values = [self._beside(terms[broad], prior_scale, problem, rows, levels) for prior_scale in grids[broad]]
+        problem = self.projected(narrow, levels) if narrow else None
+        values = [self._with_broad_term(terms[broad], scale, problem, rows, levels) for scale in grids[broad]]
         values = [value.reshape(len(levels), *map(len, others)) for value in values]
         return np.stack(values, axis=broad + 1).reshape(len(levels), -1), combinations
 
@@ -230,21 +241,21 @@ class ModelEvidence:
     def remaining_columns(self, terms, prior_scales, level):
         """All columns other than the broad term of a set, and the problem of the set's others.
 
-        Gram matrix (K, K) of all columns; across (K, z): what the broad term takes of it, its product with its
-        transpose; moments (K,) after that; the MarginalProblem at the level (an index), and the prior
+        Gram matrix (K, K) of all columns; across (K, z): factor of the part that the broad term absorbs, the product
+        with its transpose; moments (K,) after that; the MarginalProblem at the level (an index), and the prior
         deviations of its coefficients at the prior scales, both None where there is nothing else.
         """
         broad = self._broadest(terms)
         gram, moment, _ = self._whitened.gram(level)
-        rest, prior_scales = tuple(terms), np.asarray(prior_scales, dtype=float)
+        narrow, prior_scales = tuple(terms), np.asarray(prior_scales, dtype=float)
         across, average = np.zeros((len(moment), 0)), None
         if broad is not None:
             average = self._average(terms[broad], prior_scales[broad], level)
             across, moment = average.across, average.moment
-            rest, prior_scales = (*terms[:broad], *terms[broad + 1 :]), np.delete(prior_scales, broad)
-        if not rest:
+            narrow, prior_scales = (*terms[:broad], *terms[broad + 1 :]), np.delete(prior_scales, broad)
+        if not narrow:
             return gram, across, moment, None, None
-        problem = self.projected(rest, [level])
+        problem = self.projected(narrow, [level])
         if average is not None:
             problem = problem.on(*(part[None] for part in average.rest(problem.index)))
         return gram, across, moment, problem, problem.scale(prior_scales[None])[0]
@@ -256,8 +267,8 @@ class ModelEvidence:
         wide = [count if many else 0 for count, many in zip(counts, broad, strict=True)]
         return int(np.argmax(wide)) if any(wide) else None
 
-    def _beside(self, broad, prior_scale, problem, prior_scales, levels):
-        """Log evidence (levels, m) of a broad term at a prior scale beside other terms.
+    def _with_broad_term(self, broad, prior_scale, problem, prior_scales, levels):
+        """Log evidence (levels, m) of a broad term at a prior scale together with other terms.
 
         problem: the others' MarginalProblem at the levels, None where there are none; prior_scales (m, terms): theirs.
         """
@@ -276,7 +287,7 @@ class ModelEvidence:
         def make():
             gram, moment, _ = self._whitened.gram(level)
             prior = self._prior(term)
-            # drives on which the law does not act by this term: no set has a law twice
+            # drives on which this term does not act: no set has an effect twice
             apart = self._whitened.layout[0][term.effect, term.shape, EACH]
             return Average(gram, moment, prior.index, prior.at(prior_scale), apart)
 
@@ -298,8 +309,8 @@ class ModelEvidence:
     def over_all_strengths(self, terms, level, start=None):
         """Log evidence of a set of terms at a level (an index) averaged over their prior scales, and the best (terms,).
 
-        Of one term or two over all combinations; of more over each prior scale about the others' best, as if they were
-        independent of each other. start (terms,): prior scales to begin from.
+        For one term or two it averages over all combinations; for more over each prior scale about the others' best, as
+        if they were independent. start (terms,): prior scales to begin from.
         """
         if len(terms) <= OPTIONS.max_jointly_averaged_effects:
             value, grid = self.over_strengths(terms, levels=[level])
@@ -309,7 +320,7 @@ class ModelEvidence:
         for _ in range(OPTIONS.prior_scale_sweeps):
             before = best.copy()
             for k, term in enumerate(terms):
-                # what is tried comes last: the others' part stands
+                # the term that is tried comes last, so that the others' part is cached
                 others = *terms[:k], *terms[k + 1 :]
                 grids = *([prior_scale] for prior_scale in np.delete(best, k)), PRIOR_SCALES
                 value, _ = self.over_strengths((*others, term), grids, [level])
@@ -344,10 +355,10 @@ class ModelEvidence:
         broad = self._broadest(terms)
         if broad is None:
             return mean_over_cases(self.projected(terms, [level]), np.asarray(prior_scales)[None])
-        rest, prior = (*terms[:broad], *terms[broad + 1 :]), self._prior(terms[broad])
+        narrow, prior = (*terms[:broad], *terms[broad + 1 :]), self._prior(terms[broad])
         index, found, problem = np.zeros(0, dtype=int), np.zeros(0), None
-        if rest:
-            problem = self.projected(rest, [level])
+        if narrow:
+            problem = self.projected(narrow, [level])
             index = problem.index
             problem = problem.on(
                 *(p[None] for p in self._average(terms[broad], prior_scales[broad], level).rest(index))
@@ -355,15 +366,15 @@ class ModelEvidence:
             found = mean_over_cases(problem, np.delete(prior_scales, broad)[None])
         gram, moment, _ = self._whitened.gram(level)
         others = found if problem is None or problem.mix is None else problem.mix @ found
-        own = averaged_mean(gram, moment, prior.index, prior.at(prior_scales[broad]), index, others)
+        of_broad = averaged_mean(gram, moment, prior.index, prior.at(prior_scales[broad]), index, others)
         before = sum(len(self._prior(term).index) for term in terms[:broad])
-        return np.concatenate([found[:before], own, found[before:]])
+        return np.concatenate([found[:before], of_broad, found[before:]])
 
     @_on_complete
     def coefficients(self, terms, prior_scales, level):
         """Mean (k,) and covariance (k, k) of the coefficients of a set of terms at prior scales and a level (an index).
 
-        The mean obeys the positive coefficients; the covariance does not know of them.
+        The mean satisfies the constraint on positive coefficients; the covariance ignores it.
         """
         return over_cases(self.projected(terms, [level]), np.asarray(prior_scales)[None])
 

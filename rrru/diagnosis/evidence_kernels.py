@@ -99,11 +99,11 @@ def _find_least_probable(mean, covariance, order, count):
 def _multiply(mean, covariance, i, precision, shift):
     """Multiply a normal density by exp(-precision x_i^2 / 2 + shift x_i), in place; returns the variance's ratio."""
     p, ratio = len(mean), 1.0 + precision * covariance[i, i]
-    step, own, inverse = (shift - precision * mean[i]) / ratio, precision / ratio, 1.0 / ratio
+    step, reduced, inverse = (shift - precision * mean[i]) / ratio, precision / ratio, 1.0 / ratio
     for r in range(p):
         mean[r] += covariance[i, r] * step
         if r != i:
-            factor = own * covariance[i, r]
+            factor = reduced * covariance[i, r]
             for c in range(r + 1):
                 if c != i:
                     covariance[r, c] -= factor * covariance[i, c]
@@ -255,7 +255,7 @@ def log_evidence_and_correction(gram, moment, scale, positive):
     order, state = np.empty(p, dtype=np.int64), np.empty((p, COLUMNS))
     for level in range(v):
         for j in range(m):
-            # rows of the factor stand as long as no scale up to them changes
+            # rows of the factor stay as long as no scale up to them changes
             first = 0
             while j > 0 and first < k and scale[j, first] == scale[j - 1, first]:
                 first += 1
@@ -279,7 +279,7 @@ def log_evidence_of_blocks(gram, moment, across, numbers, ends, scale, positive)
     result = np.empty((len(ends) - 1, len(scale)))
     for b in range(len(ends) - 1):
         first, size = ends[b], ends[b + 1] - ends[b]
-        own, target = np.empty((1, size, size)), np.empty((1, size))
+        block, target = np.empty((1, size, size)), np.empty((1, size))
         for r in range(size):
             i = numbers[first + r]
             target[0, r] = moment[i]
@@ -288,9 +288,9 @@ def log_evidence_of_blocks(gram, moment, across, numbers, ends, scale, positive)
                 entry = gram[i, j]
                 for q in range(across.shape[1]):
                     entry -= across[i, q] * across[j, q]
-                own[0, r, c] = own[0, c, r] = entry
+                block[0, r, c] = block[0, c, r] = entry
         deviation, kinds = scale[:, first : first + size].copy(), positive[first : first + size]
-        result[b] = log_evidence_and_correction(own, target, deviation, kinds)[0][0]
+        result[b] = log_evidence_and_correction(block, target, deviation, kinds)[0][0]
     return result
 
 
@@ -302,7 +302,7 @@ def log_evidence(gram, moment, scale, positive):
     """
     if np.count_nonzero(positive) < 2:
         return log_evidence_and_correction(gram, moment, scale, positive)[0]
-    # prior scales that a law's largest size caps have the same deviations, and moments take long
+    # prior scales that an effect's upper bound caps have the same deviations, and moments take long
     distinct, which = _distinct(scale)
     return log_evidence_and_correction(gram, moment, scale[distinct], positive)[0][:, which]
 
@@ -319,5 +319,5 @@ def log_sum_exp(value):
     top = value.max(axis=-1, keepdims=True)
     largest = value == top
     count = largest.sum(axis=-1)
-    rest = np.exp(np.where(largest, -np.inf, value) - top).sum(axis=-1)
-    return np.log1p(rest / count) + np.log(count) + top[..., 0]
+    others = np.exp(np.where(largest, -np.inf, value) - top).sum(axis=-1)
+    return np.log1p(others / count) + np.log(count) + top[..., 0]

@@ -1,4 +1,4 @@
-"""What a hypothesis predicts of points that it was not fitted on."""
+"""Cross-validation: what a hypothesis predicts of points that it was not fitted on."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -22,9 +22,9 @@ from rrru.estimation.noise_model import half_waves, lengths
 class Prediction:
     """Predictions of left-out points.
 
-    residual_mm (n, 3): what they get wrong; spread (n, 3, k): the part of it that one standard deviation of each of k
-    independent combinations of the fitted numbers makes; left_mm2 (n, 3): variance of what no fit predicts, noise and
-    discrepancy, along the cosines of the series (n,) where these are told, else at each point.
+    residual_mm (n, 3): errors of the predictions; spread (n, 3, k): changes of the predictions by one standard
+    deviation of each of k independent combinations of the fitted parameters; left_mm2 (n, 3): variance of noise and
+    discrepancy, along the cosines of the series (n,) where these are given, else at each point.
     """
 
     residual_mm: np.ndarray
@@ -47,8 +47,8 @@ class Prediction:
     def coordinates(self):
         """Residuals (n, 3) and their spread (n, 3, k) as they are scored.
 
-        Of series they are those of the cosines, whose scores have the points' sum over a series: what is smooth along a
-        run is one thing to foretell and not one at every point.
+        With series they are those of the cosines, whose scores have the same sum over a series as those of the points:
+        a smooth part of a run is one prediction, not one at every point.
         """
         if self.series is None:
             return self.residual_mm, self.spread
@@ -73,14 +73,14 @@ class HeldOut:
         """Fold numbers (m,) whose complements determine the calibration, see `rrru.estimation.cross_validation`.
 
         Runs where every trajectory was driven more than once. Else five interleaved stretches: leaving out the only
-        run of a kind would ask for extrapolation, which says nothing about the effect. Where these leave a parameter
-        to one fold alone, as of a target that was seen at a few stops, every fifth stop.
+        run of a kind would require extrapolation, which says nothing about the effect. Where one fold alone determines
+        a parameter, as of a target that was seen at a few stops, every fifth stop.
         """
         white = self.evidence.linear.base / self.case.noise_mm
         return choose_folds(self._candidates(), white)
 
     def _candidates(self):
-        """Fold numbers (m,), the ones that ask for most first."""
+        """Fold numbers (m,), the most demanding ones first."""
         frame, run = self.case.points, self.case.run
         if (frame.groupby("trajectory")["run"].nunique() > 1).all():
             yield np.unique(run, return_inverse=True)[1] % OPTIONS.max_run_folds
@@ -107,8 +107,8 @@ class HeldOut:
     def gains(self, terms, prior_scales, level):
         """Log predictive score that each of the terms adds to that of the others, at these prior scales.
 
-        Without the term its coefficients t are zero. Of a normal distribution with mean m and covariance C the others
-        then have the mean m - C_.t C_tt^-1 m_t and the covariance C - C_.t C_tt^-1 C_t. .
+        Without the term its coefficients t are zero. The others then have the mean m - C_.t C_tt^-1 m_t and the
+        covariance C - C_.t C_tt^-1 C_t. of a normal distribution with mean m and covariance C.
 
         Readings at which a term lacks what it needs do not count.
         """

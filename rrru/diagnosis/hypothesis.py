@@ -1,4 +1,4 @@
-"""A set of terms that may be what acts, and how well it explains the data."""
+"""A hypothesis: a set of terms, and its evidence."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -28,5 +28,5 @@ class Hypothesis:
         return int(self.evidence.argmax())
 
     def strengths_of(self, terms, level):
-        """Strengths of some of its terms at a level (an index)."""
+        """Prior scales of some of its terms at a level (an index)."""
         return [float(self.prior_scales[level][self.terms.index(term)]) for term in terms]

@@ -1,4 +1,4 @@
-"""Which effects cause the gap: calibrate, look for the best set, fit it on the exact sim, look again from there."""
+"""Which effects cause the gap: calibrate, search the best set, fit it on the exact model, search again from there."""
 
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -26,7 +26,7 @@ from rrru.diagnosis.whitened import DISCREPANCY_SCALES, spectrum
 from rrru.errors import FitError
 from rrru.estimation.noise_model import MIN_FREE_NUMBERS, alike, fit_noise, high_frequency_noise
 
-# what is told of the noise
+# what the configuration says of the noise
 KNOWN, STATED, UNKNOWN_NOISE = "known", "stated", "unknown"
 
 
@@ -61,10 +61,10 @@ class InferenceResult:
         """Predictions of left-out points."""
         return HeldOut(self.case, self.evidence)
 
-    def with_posterior(self, beliefs):
+    def with_posterior(self, posterior):
         """The inference with another posterior and its best hypothesis; the fit stays."""
-        hypothesis, level = beliefs.best()
-        return replace(self, posterior=beliefs, hypothesis=hypothesis, level=level)
+        hypothesis, level = posterior.best()
+        return replace(self, posterior=posterior, hypothesis=hypothesis, level=level)
 
 
 def with_arm(case, noise_mm=None, noise_rad=None):
@@ -83,21 +83,22 @@ def with_arm(case, noise_mm=None, noise_rad=None):
     return replace(case, arm_mm=noise_mm / noise_rad)
 
 
-def with_beside(case):
-    """The case with reflectors beside the robot counted by what everything fitted leaves of them and of the others."""
-    if not case.beside.any() or case.beside.all():
+def with_world_scale(case):
+    """The case with reflectors off the robot weighted by the ratio of the residuals of a fit of everything."""
+    if not case.on_world.any() or case.on_world.all():
         return case
     linear, columns = _few(case, calibrate(case))
     flat = columns.reshape(linear.data.size, -1)
     size = np.maximum(np.linalg.norm(flat, axis=0), 1e-300)
     fitted = flat / size @ np.linalg.lstsq(flat / size, linear.data.ravel(), rcond=1e-9)[0]
     squares = ((linear.data.ravel() - fitted).reshape(-1, 3) ** 2).sum(axis=1)
-    others = case.positions & ~case.beside
-    return replace(case, beside_scale=float(np.sqrt(squares[others].mean() / max(squares[case.beside].mean(), 1e-12))))
+    others = case.positions & ~case.on_world
+    scale = np.sqrt(squares[others].mean() / max(squares[case.on_world].mean(), 1e-12))
+    return replace(case, beside_scale=float(scale))
 
 
 def with_noise(case, linear, stated_mm):
-    """The case under the noise that is left of a linearisation when all that may be has been fitted, and where from.
+    """The case under the noise that a fit of all columns of a linearisation leaves, and the source of that noise.
 
     "fitted", see `rrru.estimation.noise_model`, or "repeats" where poses that were measured again say clearly less.
     """
@@ -105,7 +106,7 @@ def with_noise(case, linear, stated_mm):
     if 3 * complete.sum() < linear.base.shape[-1] + MIN_FREE_NUMBERS:
         complete[:] = True
     columns = _noise_columns(case, linear, bool(stated_mm) or repeats[1] >= noise.ENOUGH_REPEATS)
-    # an effect that acts where it is unknown how is no noise
+    # an effect is no noise where its inputs are unknown
     data, columns, series = linear.data[complete], columns[complete], case.series[complete]
     model = fit_noise(data, columns, series, stated_mm, repeats, spectrum if case.along_paths else None)
     model = replace(model, alike=alike(data, columns, case.stop[complete], case.kind[complete]))
@@ -118,9 +119,10 @@ def with_noise(case, linear, stated_mm):
 def _noise_columns(case, linear, known):
     """Columns (m, 3, k) that may explain the readings while the noise is estimated.
 
-    All of the library; where these leave too few numbers without effects of many coefficients, then each effect in the
-    shape alone that fits best, then without unknown functions. known: whether the noise is known otherwise, so that no
-    number needs to be left; where it is not and the library explains everything, what the calibration leaves has to do.
+    All of the library. Where these leave too few numbers: without effects of many coefficients, then each effect in the
+    best shape alone, then without the functions of the discrepancy. known: whether the noise is known otherwise, so
+    that no number needs to be left. Where it is not and the library explains everything, the residuals of the
+    calibration are used.
     """
     blocks = {key: columns for key, columns in linear.columns.items() if key[0] in case.library}
     for chosen in _fewer_blocks(linear, blocks, case.library):
@@ -133,30 +135,30 @@ def _noise_columns(case, linear, known):
 def _fewer_blocks(linear, blocks, library):
     """Blocks of columns by (effect, shape), in steps fewer of them."""
     yield blocks
-    few = {key: one for key, one in blocks.items() if not library[key[0]].coordinates.broad}
+    few = {key: columns for key, columns in blocks.items() if not library[key[0]].coordinates.broad}
     yield few
     fitting = _best_shapes(linear, few)
     yield fitting
-    yield {key: one for key, one in fitting.items() if key[0] not in UNKNOWN}
+    yield {key: columns for key, columns in fitting.items() if key[0] not in UNKNOWN}
 
 
 def _best_shapes(linear, blocks):
-    """Of each effect the block of columns that leaves least of the data together with the calibration."""
+    """For each effect the block of columns with the smallest residuals together with the calibration."""
     basis, _ = np.linalg.qr(linear.base.reshape(linear.data.size, -1))
     best = {}
     for key, columns in blocks.items():
         flat = columns.reshape(linear.data.size, -1)
         flat = flat - basis @ (basis.T @ flat)
         size = np.maximum(np.linalg.norm(flat, axis=0), 1e-300)
-        own = np.linalg.lstsq(flat / size, linear.data.ravel(), rcond=1e-9)[0]
-        explained = float(((flat / size @ own) ** 2).sum())
+        coefficients = np.linalg.lstsq(flat / size, linear.data.ravel(), rcond=1e-9)[0]
+        explained = float(((flat / size @ coefficients) ** 2).sum())
         if explained > best.get(key[0], (-np.inf, None))[0]:
             best[key[0]] = explained, key
     return {key: blocks[key] for _, key in best.values()}
 
 
 def _few(case, calibrated):
-    """The linearisation about a calibration, and the columns (m, 3, k) of all but laws of many coefficients.
+    """The linearisation about a calibration, and the columns (m, 3, k) of all effects with few coefficients.
 
     Where these would leave less than a third of the numbers free, the calibration's columns alone.
     """
@@ -172,9 +174,9 @@ def infer(case, prior, stated=KNOWN):
     for cleaning in range(OPTIONS.max_outlier_rounds + 1):
         calibrated = calibrate(case)
         if stated == UNKNOWN_NOISE:
-            # spikes would pass for noise
+            # isolated outliers would be taken for noise
             outliers = isolated(case.residual(calibrated), case.series, 0.0, case.kind)
-            # what arrived from the other side than its neighbours is no outlier
+            # a reading that was approached from the other side than its neighbours is no outlier
             outliers &= case.complete(case.library)
             if outliers.any():
                 case = case.without(outliers)
@@ -196,9 +198,9 @@ def with_effects(inference, effects):
     if known is None:
         terms = tuple(term for term in inference.hypothesis.terms if term.effect in effects)
         found, prior_scales = np.full(len(DISCREPANCY_SCALES), -np.inf), np.ones((len(DISCREPANCY_SCALES), len(terms)))
-        for each in inference.evidence.levels:
-            found[each], prior_scales[each] = inference.evidence.over_all_strengths(terms, each)
-        # what an unknown function explains with them is a discrepancy without it
+        for index in inference.evidence.levels:
+            found[index], prior_scales[index] = inference.evidence.over_all_strengths(terms, index)
+        # what a discrepancy function explains with them is a discrepancy without it
         known = Hypothesis(terms, found, prior_scales), int(found.argmax())
     hypothesis, level = known
     starts = (inference.fit.state, inference.origin) if hypothesis.terms else (inference.calibrated,)
@@ -222,42 +224,43 @@ def fit_hypothesis(case, evidence, starts, chosen, known=None):
     return fit_model(case, starts, terms, scales, level)
 
 
-class _Looks:
-    """What one sees of a case at a state: laws found in it, columns at the state, the noise; once for each call."""
+class _Linearization:
+    """Case, columns and noise at a state, with the harmonics and spectra that the residuals show there."""
 
     def __init__(self, stated, stated_mm):
         self._stated, self._stated_mm = stated, stated_mm
         self._source = None
 
     def at(self, case, state, terms=()):
-        """Case with its laws and noise, its linearisation at a state with a hypothesis' terms, the noise's source."""
+        """Case with harmonics and noise, its linearisation at a state with a hypothesis' terms, the noise's source."""
         linear = case.linearise(state)
         case, orders = with_orders(case, linear, terms)
         case, waves = with_spectra(case, linear, terms)
-        kept = {key: columns for key, columns in linear.columns.items() if key[0] in case.library}
-        linear = replace(linear, columns=kept)
+        columns_of = {key: columns for key, columns in linear.columns.items() if key[0] in case.library}
+        linear = replace(linear, columns=columns_of)
         if orders or waves:
-            linear = replace(linear, columns=kept | case.linearise(state, [*orders, *waves]).columns)
+            linear = replace(linear, columns=columns_of | case.linearise(state, [*orders, *waves]).columns)
         if self._stated == KNOWN:
             return case, linear, "given"
-        # many columns take long to be projected out, and leave the same wherever they are taken
+        # many columns take long to be projected out, and leave the same residuals at every state
         if self._source and any(effect.coordinates.broad for effect in case.library.values()):
             return case, linear, self._source
-        under, self._source = with_noise(case, linear, self._stated_mm if self._stated == STATED else None)
-        return under, linear, self._source
+        with_found, self._source = with_noise(case, linear, self._stated_mm if self._stated == STATED else None)
+        return with_found, linear, self._source
 
 
-def _bends(case, linear, state, fitted):
-    """Whether the exact sim at a fitted state without shapes is off what a linearisation about a state says there."""
-    said = linear.data - linear.base @ (fitted.deviations - state.deviations)
-    said = said - sum(linear.columns[key] @ numbers for key, numbers in fitted.effects.items())
-    return np.sqrt(((case.residual(fitted) - said) ** 2).mean()) > OPTIONS.max_nonlinearity_per_noise * case.noise_mm
+def _is_nonlinear(case, linear, state, fitted):
+    """Whether the exact model at a fitted state without shapes differs from the linearisation about a state."""
+    predicted = linear.data - linear.base @ (fitted.deviations - state.deviations)
+    predicted = predicted - sum(linear.columns[key] @ numbers for key, numbers in fitted.effects.items())
+    difference = np.sqrt(((case.residual(fitted) - predicted) ** 2).mean())
+    return difference > OPTIONS.max_nonlinearity_per_noise * case.noise_mm
 
 
 def _rounds(case, calibrated, prior, stated):
     """Search and fit in turn until a hypothesis is the best one again."""
-    looks, seen, start = _Looks(stated, case.noise_mm), set(), origin(case)
-    case, linear, source = looks.at(case, calibrated)
+    linearization, seen, start = _Linearization(stated, case.noise_mm), set(), origin(case)
+    case, linear, source = linearization.at(case, calibrated)
     case, linear = with_seen(case, linear)
     fit = fit_model(case, [calibrated])
     calibrated = state = fit.state
@@ -267,45 +270,45 @@ def _rounds(case, calibrated, prior, stated):
     for _ in range(OPTIONS.max_search_rounds):
         space = ModelSpace(evidence.on_library(), prior)
         first, confirmed = space.search(hypothesis.terms if hypothesis else ()), False
-        beliefs = space.posterior([first])
+        posterior = space.posterior([first])
         while True:
-            hypothesis, level = beliefs.best()
+            hypothesis, level = posterior.best()
             shaped = any(len(case.library[term.effect].coordinates.shapes) > 1 for term in hypothesis.terms)
-            unknown = not hypothesis.effects.isdisjoint(UNKNOWN)
-            # where an unknown function wins, a second look from its fit shows nothing else, unless the sim bends on the
-            # way there or a law's shape is still to be fitted
-            settled = unknown and small and not shaped
-            # laws get their chance before an unknown function takes what their linear fit leaves
-            named = beliefs.best_of(hypothesis.effects - set(UNKNOWN)) if unknown and (small or shaped) else None
+            discrepant = not hypothesis.effects.isdisjoint(UNKNOWN)
+            # where a discrepancy function wins, a second linearisation at its fit is needed only if the model is
+            # nonlinear on the way there, or the shape of an effect is still to be fitted
+            settled = discrepant and small and not shaped
+            # try the effect models before the discrepancy basis
+            named = posterior.best_of(hypothesis.effects - set(UNKNOWN)) if discrepant and (small or shaped) else None
             tried, its_level = named or (hypothesis, level)
             ended = frozenset(hypothesis.terms) in seen or not hypothesis.terms
             ended |= settled and (tried is hypothesis or not tried.terms)
             if confirmed or not ended:
                 break
-            # an answer stands once a search from the other end has found nothing better
-            beliefs, confirmed = space.confirmed(first), True
+            # an answer is accepted once a search from the other end has found nothing better
+            posterior, confirmed = space.confirmed(first), True
         if ended:
             break
         seen.add(frozenset(hypothesis.terms))
-        # what a dropped effect has done to the others' numbers can hold a fit back
+        # values that a dropped effect has left in the others can trap a fit
         dropped = {name for name, _ in state.effects} - tried.effects
         found = fit_hypothesis(case, evidence, (calibrated if dropped else state, start), (tried, its_level))
-        if settled and not _bends(case, linear, calibrated, found.state):
+        if settled and not _is_nonlinear(case, linear, calibrated, found.state):
             break
         try:
             moved = case.standing(found.state).with_approach(found.state)
-            seen_there = looks.at(moved, found.state, tried.terms)
+            linearized = linearization.at(moved, found.state, tried.terms)
         except FitError:
-            # the fitted model has no pose at a reading: what the last linearisation says stands
+            # the fitted model has no pose at a reading: the last linearisation is used
             break
-        fit, state, (case, linear, source) = found, found.state, seen_there
+        fit, state, (case, linear, source) = found, found.state, linearized
         evidence = case.evidence(linear)
     else:
         space = ModelSpace(evidence.on_library(), prior)
         first, confirmed = space.search(hypothesis.terms), False
     if not confirmed:
-        beliefs = space.confirmed(first)
-    hypothesis, level = beliefs.best()
-    result = InferenceResult(case, start, calibrated, fit, evidence, beliefs, hypothesis, level, source)
-    # estimate and hypothesis are of one set, whether the rounds have ended or gone round
+        posterior = space.confirmed(first)
+    hypothesis, level = posterior.best()
+    result = InferenceResult(case, start, calibrated, fit, evidence, posterior, hypothesis, level, source)
+    # estimate and hypothesis are of one set, whether the rounds have converged or cycle
     return with_effects(result, hypothesis.effects)

@@ -1,4 +1,4 @@
-"""The sim of a case linearised about a state: derivatives by calibration, effects, their shapes and the drives."""
+"""The model of a case linearised about a state: derivatives by calibration, effects, their shapes and the drives."""
 
 from dataclasses import replace
 
@@ -10,14 +10,14 @@ from rrru.errors import FitError
 
 
 def linearised(case, state, keys=None):
-    """The sim of a Case linearised about a state; raises FitError where the state's sim has no pose at a point.
+    """The model of a Case linearised about a state; raises FitError where the state's model has no pose at a point.
 
     keys: (effect, shape) pairs to make columns for, by default all.
     """
     at, data = case.map_of(State(state.deviations, {})), case.residual(state)
     lost = ~np.isfinite(data).all(axis=1) | ~np.isfinite(at.point_mm[case.at]).all(axis=1)
     if lost.any():
-        raise FitError(f"the sim has no pose at {int(lost.sum())} points")
+        raise FitError(f"the model has no pose at {int(lost.sum())} points")
     if keys is None:
         keys = [(name, k) for name, effect in case.library.items() for k in range(len(effect.coordinates.shapes))]
     columns = {key: _columns(case, at, key, state) for key in dict.fromkeys((*keys, *state.effects))}
@@ -38,8 +38,9 @@ def linearised(case, state, keys=None):
 
 
 def approach_responses(case, state):
-    """Change (m, 3, K) of what is read where each drive comes from below instead of with even odds, by a state's
-    effects; at readings where the path does not determine the sense.
+    """Change (m, 3, K) of the readings by a state's effects where each drive comes from below, not with even odds.
+
+    It is of readings where the path does not determine the sense.
     """
     at, approach = case.map_of(State(state.deviations, {})), case.motion.approach
     even = np.where(np.isfinite(approach), 0.0, approach)
@@ -56,29 +57,29 @@ def approach_responses(case, state):
 
 
 def _by_shape(case, at, key, state):
-    """`Linear.shape_columns` and `Linear.shape_steps` of one effect of the state."""
+    """`LinearizedProblem.shape_columns` and `shape_steps` of one effect of the state."""
     shape, effect = state.shape(case.library, key), case.library[key[0]]
-    own = state.contribution(case.library, key, case.motion)
+    present = state.contribution(case.library, key, case.motion)
     columns, steps = [], []
     for name, value in shape.items():
         stepped = effect.doubted(name, value)
         if stepped != value:
             other = state.contribution(case.library, key, case.motion, shape=dict(shape) | {name: stepped})
-            columns.append(case.of_rows(at.move((other - own).twists)))
+            columns.append(case.of_rows(at.move((other - present).twists)))
             steps.append((name, value, stepped))
     nothing = np.zeros((len(case), 3, 0))
     return np.stack(columns, axis=-1) if columns else nothing, tuple(steps)
 
 
 def _by_weight(case, at, state, columns):
-    """`Linear.by_weight` of columns, and `Linear.weight_steps`."""
+    """`LinearizedProblem.by_weight` of columns, and its `weight_steps`."""
     weight, made = case.weight(state), {key: [] for key in columns if gives_way(case.library[key[0]])}
-    nuisance_sd = {name: doubt for name, doubt in case.nuisance_sd.items() if doubt}
-    steps = [(name, weight[name], weight[name] + doubt, -weight[name] / doubt) for name, doubt in nuisance_sd.items()]
+    nuisance_sd = {name: sd for name, sd in case.nuisance_sd.items() if sd}
+    steps = [(name, weight[name], weight[name] + sd, -weight[name] / sd) for name, sd in nuisance_sd.items()]
     for name, _, stepped, _ in steps:
         other = state.under(weight | {name: stepped})
-        for key, one in made.items():
-            one.append(_columns(case, at, key, other) - columns[key])
+        for key, parts in made.items():
+            parts.append(_columns(case, at, key, other) - columns[key])
     return {key: np.concatenate(parts, axis=-1) for key, parts in made.items() if parts}, tuple(steps)
 
 

@@ -1,4 +1,4 @@
-"""Making the case of a campaign: its motion, which points are used, which effects they can test and at which of them.
+"""Make the case of a campaign: its motion, the used points, the effects that they can test and at which of them.
 
 Lengths in mm, angles in rad.
 """
@@ -22,13 +22,16 @@ from rrru.campaign.stated_motion import stated_motion
 from rrru.diagnosis.approach_direction import at_reversals, rest_widths
 from rrru.diagnosis.discrepancy_basis import unknown_functions
 from rrru.diagnosis.options import OPTIONS
-from rrru.diagnosis.payload_nuisance import doubts_of
+from rrru.diagnosis.payload_nuisance import nuisance_priors
 from rrru.diagnosis.problem import Case
 from rrru.diagnosis.stop_paths import paths_between_stops, undetermined_senses
 from rrru.effects.motion import Course, make_motion
 from rrru.effects.protocol import PATH, complete_rows, known_values
 from rrru.errors import FitError
 from rrru.estimation.starts import register_measurements
+
+# which points are used, in words
+_USABLE = "allowed: measured points within reach that are no outliers"
 
 
 def make_case(measurements, mechanism, masses, noise_mm, library, use_near_singularity=True, arm_mm=np.nan):
@@ -39,7 +42,7 @@ def make_case(measurements, mechanism, masses, noise_mm, library, use_near_singu
     Raises FitError for an empty table.
     """
     if not len(measurements):
-        raise FitError("the campaign has no points")
+        raise FitError("the campaign has no points; allowed: at least one row: check the file of measurements")
     measurements = register_measurements(measurements, mechanism)
     actuators, command = rows.actuators(measurements, mechanism), rows.command(measurements)
     stop, (course, unknown) = stops(measurements), _course(measurements, mechanism, actuators)
@@ -48,34 +51,33 @@ def make_case(measurements, mechanism, masses, noise_mm, library, use_near_singu
     used = rows.usable(measurements, use_near_singularity) & np.isfinite(motion.position_mm).all(axis=1)
     used &= np.isfinite(mechanism.forward(actuators, guess_mm=command)).all(axis=1)
     if not used.any():
-        raise FitError("the campaign has no point that a diagnosis can use")
-    testable, untestable = _tested(library, motion, used, _told(measurements, used, stop))
+        raise FitError(f"the campaign has no point that a diagnosis can use; {_USABLE}: check the column status")
+    testable, untestable = _tested(library, motion, used, _count_numbers(measurements, used, stop))
     for name, function in unknown_functions(mechanism).items():
         if not _lacking(function, motion, used):
             testable[name] = function
     rows_of = {name: complete_rows(effect, motion) for name, effect in testable.items()}
     known = {name: rows for name, rows in rows_of.items() if not rows[used].all()}
     sizes = float(noise_mm), float(arm_mm)
-    nuisance_sd, bounds = doubts_of(motion, masses)
-    of_weight = {"nuisance_sd": nuisance_sd, "bounds": bounds}
-    more = {"motion_at": motion_at, "known": known, **of_weight}
+    nuisance_sd, bounds = nuisance_priors(motion, masses)
+    more = {"motion_at": motion_at, "known": known, "nuisance_sd": nuisance_sd, "bounds": bounds}
     return Case(mechanism, measurements, motion, used, testable, untestable, *sizes, **more)
 
 
-def _tested(library, motion, used, told):
+def _tested(library, motion, used, count):
     """Effects that the used points can test, and others with the reason.
 
-    told: how many numbers the used points tell of the robot.
+    count: how many numbers the used points give about the robot.
     """
     testable, untestable = {}, {}
     for name, effect in library.items():
         if _fitted(effect, motion):
-            untestable[name] = "the calibration's own parameters take it up"
+            untestable[name] = "the calibration's own parameters absorb it"
             continue
-        if effect.coordinates.broad and len(effect.coordinates) > OPTIONS.max_coefficients_per_number * told:
-            coarser = effect.coarser(OPTIONS.max_coefficients_per_number * told) if effect.coarser else None
+        if effect.coordinates.broad and len(effect.coordinates) > OPTIONS.max_coefficients_per_number * count:
+            coarser = effect.coarser(OPTIONS.max_coefficients_per_number * count) if effect.coarser else None
             if coarser is None:
-                untestable[name] = f"has {len(effect.coordinates)} coefficients, too many for {told} measured numbers"
+                untestable[name] = f"has {len(effect.coordinates)} coefficients, too many for {count} measured numbers"
                 continue
             effect = coarser
         lacking = _lacking(effect, motion, used)
@@ -87,7 +89,7 @@ def _tested(library, motion, used, told):
 
 
 def _lacking(effect, motion, used):
-    """Why the used points do not tell what an effect needs, empty where they do."""
+    """Why the used points do not determine what an effect needs, empty where they do."""
     values = {need: getattr(motion, need)[used] for need in effect.needs if need != PATH}
     known = {need: value[known_values(value)].reshape(-1, value[0].size) for need, value in values.items()}
     none = [name for name, value in known.items() if not len(value)]
@@ -106,18 +108,18 @@ def no_approach(used):
     return f"the sense in which the drives arrive is known at none of {int(used.sum())} points"
 
 
-def _told(measurements, used, stop):
-    """How many numbers the used points tell of the robot: at each stop no more than the six of a platform's pose."""
+def _count_numbers(measurements, used, stop):
+    """How many numbers the used points give about the robot: at each stop at most the six of the platform's pose."""
     turned = np.zeros(len(used), dtype=bool)
     if rows.has_turns(measurements):
         turned = measurements["measured_rx_rad"].notna().to_numpy()
-    beside = rows.on_the_world(measurements)
-    own = used if beside is None else used & ~beside
-    return int(np.minimum(np.bincount(stop, own * (3.0 + 3.0 * turned)), 6.0).sum())
+    on_world = rows.on_the_world(measurements)
+    on_robot = used if on_world is None else used & ~on_world
+    return int(np.minimum(np.bincount(stop, on_robot * (3.0 + 3.0 * turned)), 6.0).sum())
 
 
 def _fitted(effect, motion):
-    """Whether an effect changes nothing but constant numbers that the calibration chooses its parameters from."""
+    """Whether an effect changes only constants from which the calibration chooses its parameters."""
     coordinates = effect.coordinates
     values = coordinates.to_values(np.array(coordinates.typical), coordinates.shapes[0])
     twists = np.asarray(effect.contribute(motion, values).twists)
@@ -127,7 +129,7 @@ def _fitted(effect, motion):
 def _unknown_approach(measurements, mechanism, course):
     """Where (n, K) the rows do not determine from which side a drive comes: starts of runs, and next to reversals."""
     run, stop = measurements["run"].to_numpy(), stops(measurements)
-    # no column tells how the robot got to a run's start
+    # no column says how the robot got to a run's start
     starts = np.isin(stop, stop[starts_of_runs(run)])
     result = np.repeat(starts[:, None], course.drive.shape[1], axis=1)
     if course.stops:
@@ -139,19 +141,19 @@ def _unknown_approach(measurements, mechanism, course):
 
 
 def _course(measurements, mechanism, actuators):
-    """What the robot was told to do, and where (n, K) it is not determined from which side a drive comes.
+    """The commanded Course, and where (n, K) it is not determined from which side a drive comes.
 
-    At the measured points with the table's own actuator values.
+    At the measured points it has the table's own actuator values.
     """
-    path, told = driven_path(measurements)
+    path, motion = driven_path(measurements)
     if mechanism.orients:
-        told["drive_motion"] = drive_rates(measurements, actuators)
+        motion["drive_motion"] = drive_rates(measurements, actuators)
     stated = stated_motion(measurements)
     if stated is not None and stated.stops:
-        return _stopping(measurements, mechanism, Course(drive=actuators, path_drive=actuators, stops=True, **told))
+        return _stopping(measurements, mechanism, Course(drive=actuators, path_drive=actuators, stops=True, **motion))
     at_rest = not passes_points(measurements)
-    path_drive = _path_drive(measurements, path, (mechanism, actuators, told["path_index"]))
-    course = Course(drive=actuators, path_drive=path_drive, stops=at_rest, **told)
+    path_drive = _path_drive(measurements, path, (mechanism, actuators, motion["path_index"]))
+    course = Course(drive=actuators, path_drive=path_drive, stops=at_rest, **motion)
     return course, _unknown_approach(measurements, mechanism, course)
 
 
@@ -175,7 +177,7 @@ def _path_drive(measurements, path, drives, degree=DEGREE):
     """
     mechanism, actuators, index = drives
     if mechanism.orients or not passes_points(measurements):
-        # positions do not tell the orientation between the points, nor the way between stops
+        # positions do not determine the orientation between the points, nor the path between stops
         evenly = np.stack([np.interp(np.arange(len(path)), index, one) for one in actuators.T], axis=1)
         result = smooth_drives(measurements, evenly, index, degree)
     else:

@@ -1,11 +1,11 @@
-"""Averages over the many coefficients of a broad term: what they leave to be told by the other columns.
+"""Marginalisation over the many coefficients of a broad term, which leaves a problem in the other columns.
 
-With the whitened Gram matrix G, moments g and prior sizes s of the term's own columns (z) the average over them is that
-of a problem in the other columns (x) alone:
+G is the whitened Gram matrix, g are the moments and s the prior sizes of the term's own columns (z). The average over
+their coefficients is a problem in the other columns (x) alone:
 
     G' = G_xx - G_xz A^-1 G_zx,  g' = g_x - G_xz A^-1 g_z,  A = G_zz + diag(s^-2)
 
-and their evidence beside it is 1/2 g_z A^-1 g_z - 1/2 log |I + diag(s) G_zz diag(s)|.
+to whose log evidence the term adds 1/2 g_z A^-1 g_z - 1/2 log |I + diag(s) G_zz diag(s)|.
 """
 
 from functools import cached_property
@@ -37,7 +37,7 @@ class Average:
 
     @cached_property
     def across(self):
-        """What the average takes of the other columns (K, z): their Gram matrix less it times its transpose is left."""
+        """Factor (K, z) of what is averaged out of the other columns' Gram matrix: its product with its transpose."""
         columns = self._size[:, None] * self._gram[self._index]
         half = solve_triangular(self._factor, columns, lower=True, check_finite=False)
         return np.where(self.others[:, None], half.T, 0.0)
@@ -49,8 +49,8 @@ class Average:
 
     def rest(self, index):
         """Gram matrix (k, k) and moments (k,) of some of the other columns after the average."""
-        own = self.across[index]
-        return self._gram[index[:, None], index] - own @ own.T, self.moment[index]
+        across = self.across[index]
+        return self._gram[index[:, None], index] - across @ across.T, self.moment[index]
 
 
 def averaged_mean(gram, moment, index, size, others, values):

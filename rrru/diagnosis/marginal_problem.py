@@ -20,7 +20,7 @@ class Prior(NamedTuple):
 
     @classmethod
     def normal(cls, index):
-        """Of columns of unit deviation, which no prior scale scales."""
+        """Prior of columns of unit deviation, which no prior scale changes."""
         nothing = np.zeros(len(index))
         return cls(index, nothing + 1.0, nothing + np.inf, nothing > 0.0)
 
@@ -33,11 +33,11 @@ class Prior(NamedTuple):
 class MarginalProblem:
     """Least squares of k coefficients with their priors, the calibration taken out.
 
-    Those of the terms come first, then those of their shapes, last those of the weight, both owned by nobody. gram
+    Those of the terms come first, then those of their shapes, last those of payload and tilt, both without owner. gram
     (levels, k, k), moment (levels, k); size, largest, positive, about (k,): of the prior; owner (k,): number of the
-    term, the terms' count for nobody; index (r,): of the columns; mix (r, k): what makes the coefficients' columns of
-    these, None where they are the same; weights: of the weight's coefficients whether each is a lean, no mass,
-    and at_least (terms,): prior scales under which the terms are as large as found.
+    term, the terms' count without one; index (r,): of the columns; mix (r, k): what makes the coefficients' columns of
+    these, None where they are the same; weights: of each coefficient of payload and tilt whether it is a tilt, no
+    mass; and at_least (terms,): prior scales under which the terms are as large as found.
     """
 
     gram: np.ndarray
@@ -54,7 +54,7 @@ class MarginalProblem:
 
     @classmethod
     def of(cls, priors, count, grams):
-        """Of the Priors of so many terms, and after them of their shapes.
+        """The problem with the Priors of so many terms, and after them of their shapes.
 
         grams: from numbers (k,) of columns to their Gram matrices (levels, k, k) and moments (levels, k).
         """
@@ -72,16 +72,16 @@ class MarginalProblem:
         """The problem with terms (terms,), and coefficients (k,) of these and of shapes, in an order of old numbers."""
         k = np.concatenate([coefficients, np.arange(len(coefficients), len(self.size))])
         rank = np.append(np.argsort(terms), len(terms))
-        each = {name: getattr(self, name)[k] for name in ("size", "largest", "positive", "about")}
+        arrays = {name: getattr(self, name)[k] for name in ("size", "largest", "positive", "about")}
         columns = {"index": self.index[k]} if self.mix is None else {"mix": self.mix[:, k]}
         at_least = None if self.at_least is None else self.at_least[terms]
         gram, moment, owner = self.gram[:, k[:, None], k], self.moment[:, k], rank[self.owner[k]]
-        return replace(self, gram=gram, moment=moment, owner=owner, at_least=at_least, **each, **columns)
+        return replace(self, gram=gram, moment=moment, owner=owner, at_least=at_least, **arrays, **columns)
 
     def scale(self, prior_scales):
         """Prior standard deviations (m, k) at prior_scales (m, terms)."""
-        each = np.concatenate([prior_scales, np.ones((len(prior_scales), 1))], axis=1)
-        return np.minimum(each[:, self.owner] * self.size, self.largest)
+        scales = np.concatenate([prior_scales, np.ones((len(prior_scales), 1))], axis=1)
+        return np.minimum(scales[:, self.owner] * self.size, self.largest)
 
 
 def gained(problem, scale):

@@ -1,7 +1,7 @@
 """The calibrated model with effects, fitted to the readings of a case: all parameters at once, under one objective.
 
     y = h(b, c, s, w) + delta + e,    b geometric errors, c coefficients of effect terms, s their shape parameters,
-                                      w the payload and tilt, of which the stated values are uncertain
+                                      w errors of the stated payload and tilt
 
 `rrru.estimation` solves it: the exact model, the noise and the discrepancy of the hypothesis, the priors of all blocks.
 Lengths in mm, angles in rad.
@@ -38,8 +38,8 @@ class EffectModel:
     """A case's model with effect terms, as the solver's Observations; its parameter vector holds blocks by name.
 
     terms: the effect terms; scales (k,): prior standard deviations of their coefficients one after the other; signed:
-    coefficients keep the sign that their law allows, and shape parameters are fitted. shapes: values of the shape
-    parameters about which their priors lie, by effect; they are at most a doubt off, 1 sigma.
+    coefficients keep the sign that their effect allows, and shape parameters are fitted. shapes: prior means of the
+    shape parameters, by effect.
     """
 
     case: object
@@ -65,30 +65,30 @@ class EffectModel:
     @cached_property
     def _shape_names(self):
         """(effect, parameter, standard deviation) of every shape parameter that is fitted."""
-        nuisance_sd = [
+        shape_sd = [
             (name, key, abs(self.case.library[name].doubted(key, value) - value))
             for name, shape in self.shapes.items()
             for key, value in shape.items()
         ]
-        return [one for one in nuisance_sd if one[2] > 0.0] if self.signed else []
+        return [named for named in shape_sd if named[2] > 0.0] if self.signed else []
 
     @cached_property
     def _weight_names(self):
-        """Names of what the weight may be off by, none where no term bears loads."""
-        bears = any(gives_way(self.case.library[term.effect]) for term in self.terms)
-        return [name for name, doubt in self.case.nuisance_sd.items() if doubt] if bears and self.signed else []
+        """Names of the errors of payload and tilt, none where no term is compliant."""
+        compliant = any(gives_way(self.case.library[term.effect]) for term in self.terms)
+        return [name for name, sd in self.case.nuisance_sd.items() if sd] if compliant and self.signed else []
 
     @cached_property
     def parameters(self):
         """The Parameters: geometry, one block a term, "shape" and "weight"."""
         blocks, start = [self.case.geometry], 0
         for term, matrix in zip(self.terms, self._matrices, strict=True):
-            own = slice(start, start + matrix.shape[1])
-            start = own.stop
+            of_term = slice(start, start + matrix.shape[1])
+            start = of_term.stop
             positive = matrix.T @ self.case.library[term.effect].coordinates.positive > 0
             low = np.where(positive & self.signed, 0.0, -np.inf)
             names = [f"{term.effect}_{k}" for k in range(matrix.shape[1])]
-            blocks.append(Block.of(term.effect, names, [""] * len(names), self.scales[own], bounds=(low, np.inf)))
+            blocks.append(Block.of(term.effect, names, [""] * len(names), self.scales[of_term], bounds=(low, np.inf)))
         if self._shape_names:
             limits = [self.case.library[name].parameters[key] for name, key, _ in self._shape_names]
             names, units = [f"{name}.{key}" for name, key, _ in self._shape_names], [one.unit for one in limits]
@@ -144,8 +144,8 @@ class EffectModel:
         blocks = [case.of_rows(at.columns(case.mechanism.directions))]
         for term, matrix in zip(self.terms, self._matrices, strict=True):
             blocks.append(self._by_coefficients(at, state, term, matrix))
-        for name, key, doubt in self._shape_names:
-            blocks.append(self._by_shape(at, state, name, key, doubt))
+        for name, key, sd in self._shape_names:
+            blocks.append(self._by_shape(at, state, name, key, sd))
         blocks += [self._by_weight(at, state, name) for name in self._weight_names]
         return -np.concatenate(blocks, axis=-1)
 
@@ -159,7 +159,7 @@ class EffectModel:
                 f[case.at][:, None, :] * response[:, :, k, None] for k, f in enumerate(effect_functions(case.motion))
             ]
             return np.concatenate(made, axis=-1) @ matrix
-        own = case.contributions(state)[key]
+        contribution = case.contributions(state)[key]
         result = np.empty((len(case), 3, matrix.shape[1]))
         for k, column in enumerate(matrix.T):
             typical = float(np.max(effect.coordinates.typical[column > 0.0]))
@@ -167,28 +167,28 @@ class EffectModel:
             apart_from_zero = size > OPTIONS.min_coefficient_per_typical * typical
             step = OPTIONS.difference_step_ratio * max(size, typical) if apart_from_zero else typical
             moved = state.contribution(case.library, key, case.motion, present + step * column)
-            result[..., k] = case.of_rows(at.move((moved - own).twists)) / step
+            result[..., k] = case.of_rows(at.move((moved - contribution).twists)) / step
         return result
 
-    def _by_shape(self, at, state, name, key, doubt):
+    def _by_shape(self, at, state, name, key, sd):
         """Derivative (m, 3, 1) of the model by a shape parameter of an effect."""
-        case, own = self.case, next(one for one in state.effects if one[0] == name)
+        case, effect = self.case, next(pair for pair in state.effects if pair[0] == name)
         value, limits = state.shape_values[name][key], case.library[name].parameters[key]
-        step = 1e-3 * doubt
+        step = 1e-3 * sd
         if value + step > limits.high:
             step = -step
         shape = state.shape_values[name] | {key: value + step}
-        moved = state.contribution(case.library, own, case.motion, shape=shape)
-        change = moved - case.contributions(state)[own]
+        moved = state.contribution(case.library, effect, case.motion, shape=shape)
+        change = moved - case.contributions(state)[effect]
         return case.of_rows(at.move(change.twists))[..., None] / step
 
     def _by_weight(self, at, state, name):
-        """Derivative (m, 3, 1) of the model by a number of the weight."""
+        """Derivative (m, 3, 1) of the model by an error of payload or tilt."""
         case, step = self.case, 1e-3 * self.case.nuisance_sd[name]
         other = state.under(state.weight | {name: state.weight[name] + step})
         moved = {
-            key: other.contribution(case.library, key, case.motion) if gives_way(case.library[key[0]]) else own
-            for key, own in case.contributions(state).items()
+            key: other.contribution(case.library, key, case.motion) if gives_way(case.library[key[0]]) else present
+            for key, present in case.contributions(state).items()
         }
         change = sum(moved.values(), Contribution()) - case.contribution(state)
         return case.of_rows(at.move(change.twists))[..., None] / step
@@ -214,9 +214,9 @@ class ModelFit:
         return self.model.terms
 
     def effect_covariance(self, term):
-        """Names of the fitted shape parameters of a term's effect, and the covariance (k + q, k + q).
+        """Names of the q fitted shape parameters of a term's effect, and the covariance (k + q, k + q).
 
-        Of the term's k coefficients, and after them of these q parameters.
+        The covariance is of the term's k coefficients, and after them of these q parameters.
         """
         chosen, shapes = self._places_of(term)
         return shapes, self.estimate.covariance[np.ix_(chosen, chosen)]
@@ -229,14 +229,14 @@ class ModelFit:
     def _places_of(self, term):
         """Places of a term's coefficients and its effect's fitted shape parameters, and the names of these."""
         parameters, prefix = self.estimate.parameters, f"{term.effect}."
-        own = np.arange(len(parameters))[parameters.places[term.effect]]
+        coefficients = np.arange(len(parameters))[parameters.places[term.effect]]
         shapes = [name for name in parameters.names if name.startswith(prefix)]
-        chosen = [*own, *(parameters.names.index(name) for name in shapes)]
+        chosen = [*coefficients, *(parameters.names.index(name) for name in shapes)]
         return chosen, [name.removeprefix(prefix) for name in shapes]
 
     @property
     def weight(self):
-        """What the weight is off by: name, unit, value and standard error of each number, nothing where none fitted."""
+        """Errors of payload and tilt, each (name, unit, value, standard error), empty where none was fitted."""
         places = self.estimate.parameters.places
         if WEIGHT not in places:
             return []
@@ -270,9 +270,9 @@ def fit_model(case, starts: Iterable[State], terms: Sequence[EffectTerm] = (), s
     """ModelFit of a Case's used readings with effect terms, whose coefficients have prior deviations scales (k,).
 
     starts: States, tried in turn until a search from one goes straight to its end; where none does, the first that is
-    as good as the best of all. A calibration that has gone far to hide an effect is a place that nothing leads away
-    from. level: of the discrepancy, an index. The Estimate says whether the search converged; raises FitError where
-    the model has no pose at any start, even without effects.
+    as good as the best of all. A calibration that has absorbed an effect may be a local minimum. level: of the
+    discrepancy, an index. The Estimate says whether the search converged; raises FitError where the model has no pose
+    at any start, even without effects.
     """
     model = EffectModel(case, tuple(terms), np.asarray(scales, dtype=float), signed)
     problem, many = (
@@ -283,12 +283,12 @@ def fit_model(case, starts: Iterable[State], terms: Sequence[EffectTerm] = (), s
     for start in starts:
         # where the exact model has no pose at a start with effects, it has one without them
         candidates = [model.vector(start), model.vector(State(start.deviations, {}))]
-        candidate = next((one for one in candidates if np.isfinite(model.residual(one)).all()), candidates[-1])
+        candidate = next((v for v in candidates if np.isfinite(model.residual(v)).all()), candidates[-1])
         fits.append(solve(problem, [candidate], _MANY_OPTIONS if many else _SOLVER_OPTIONS))
         if (fits[-1].end.straight and fits[-1].end.converged) or many:
             break
-    enough = min(one.end.cost for one in fits) + OPTIONS.equal_fits_nats
-    return ModelFit(model, next(one for one in fits if one.end.cost <= enough), level)
+    enough = min(fit.end.cost for fit in fits) + OPTIONS.equal_fits_nats
+    return ModelFit(model, next(fit for fit in fits if fit.end.cost <= enough), level)
 
 
 def fit_named_effects(case, names, calibrated, times_typical=OPTIONS.prior_sd_per_typical):

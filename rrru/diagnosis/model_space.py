@@ -2,9 +2,9 @@
 
 From a starting set on, the neighbours of the most probable set whose neighbours are not known yet are evaluated, again
 and again: sets with a term more, with one less, and with one term in place of another, be it the same effect on other
-legs or in another shape, then also with one term less. It ends when no such set has a share of the posterior worth
-mentioning: a set left out then is several worse steps away from all that matters. This is the neighbourhood search of
-C. Hans, A. Dobra and M. West, "Shotgun stochastic search for large p regression", JASA 102 (2007), which visits sets in
+legs or in another shape, then also with one term less. It ends when no such set has a relevant share of the posterior:
+a set that is left out then is several worse steps away from all relevant ones. This is the neighbourhood search of C.
+Hans, A. Dobra and M. West, "Shotgun stochastic search for large p regression", JASA 102 (2007), which visits sets in
 the order of their weight in place of a random one; the sets retained are those of Occam's window (D. Madigan and A.
 Raftery, JASA 89, 1994).
 
@@ -82,13 +82,13 @@ class ModelSpace:
         return found
 
     def posterior(self, searches):
-        """The Posterior over all sets that have been evaluated, with what sets the two best searches apart."""
+        """The Posterior over all sets that have been evaluated, with the difference of the two best searches."""
         found = list(self._known.values())
         result = Posterior.of(found)
         causes = self.library.keys() - UNKNOWN.keys()
-        each = [Posterior.of([self._known[key] for key in one.reached]) for one in searches]
-        each = sorted(each, key=lambda beliefs: -beliefs.total)[:2]
-        marginals = np.array([[beliefs.marginal(name) for name in sorted(causes)] for beliefs in each])
+        of_searches = [Posterior.of([self._known[key] for key in search.reached]) for search in searches]
+        best = sorted(of_searches, key=lambda posterior: -posterior.total)[:2]
+        marginals = np.array([[posterior.marginal(name) for name in sorted(causes)] for posterior in best])
         apart = float(np.ptp(marginals, axis=0).max(initial=0.0))
         expanded = {key: None for one in searches for key in one.expanded}
         share = sum(np.exp(self._known[key].height - result.total) for key in expanded)
@@ -143,16 +143,16 @@ class ModelSpace:
         return total, PRIOR_SCALES[gains.argmax(axis=1)]
 
     def _expand(self, centre, found):
-        """Evaluate what may matter of a set's neighbours."""
+        """Evaluate those of a set's neighbours that may matter."""
         terms, level = centre.hypothesis.terms, centre.hypothesis.level
-        prior_scales, own = centre.hypothesis.prior_scales[level], centre.hypothesis.evidence.max()
+        prior_scales, present = centre.hypothesis.prior_scales[level], centre.hypothesis.evidence.max()
         chosen = []
         for out in (None, *range(len(terms))):
-            base, start = centre.hypothesis, own
+            base, start = centre.hypothesis, present
             if out is not None:
-                rest = [k for k in range(len(terms)) if k != out]
-                smaller = tuple(terms[k] for k in rest)
-                self._evaluate(smaller, level, prior_scales[rest], climb=True)
+                remaining = [k for k in range(len(terms)) if k != out]
+                smaller = tuple(terms[k] for k in remaining)
+                self._evaluate(smaller, level, prior_scales[remaining], climb=True)
                 found.reach(smaller)
                 base = self._known[frozenset(smaller)].hypothesis
             if len(base.terms) == self._most:
@@ -160,8 +160,8 @@ class ModelSpace:
             scales = base.prior_scales[base.level]
             gains, best = self._gains(base.terms, scales, base.level)
             if out is not None:
-                # what takes a term's place adds more or less than that did
-                start = own - gains[self._candidates.terms.index(terms[out])]
+                # a replacement of a term adds more or less than that did
+                start = present - gains[self._candidates.terms.index(terms[out])]
             heights = {
                 row: start + gain + self._weigher.terms((*base.terms, self._candidates.terms[row]))
                 for row, gain in enumerate(gains.tolist())
@@ -177,11 +177,11 @@ class ModelSpace:
             self._evaluate(neighbour, level, scales)
             found.reach(neighbour)
             if {term.effect for term in neighbour} == centre.hypothesis.effects:
-                # an effect on other legs or in another shape may do what another one was needed for
+                # an effect on other legs or in another shape may make another one unnecessary
                 for out in range(len(neighbour) - 1):
-                    rest = [k for k in range(len(neighbour)) if k != out]
-                    smaller = tuple(neighbour[k] for k in rest)
-                    self._evaluate(smaller, level, scales[rest])
+                    remaining = [k for k in range(len(neighbour)) if k != out]
+                    smaller = tuple(neighbour[k] for k in remaining)
+                    self._evaluate(smaller, level, scales[remaining])
                     found.reach(smaller)
 
     def _evaluate(self, terms, level, prior_scales, climb=False):

@@ -18,7 +18,7 @@ class DiagnosisOptions:
     # numbers read beyond the calibration's parameters: 20 degrees of freedom give the noise within 16 %, 1 sigma
     min_spare_numbers: int = 20
     # sets of effects compare on the readings at which all of them have what they need: with fewer of these an effect
-    # would cost the others more than half of what is known of them
+    # would cost the others more than half of their readings
     min_complete_share: float = 0.5
     # with fewer numbers for each parameter large effects alone are found, and `few_readings` says so; assumed
     few_numbers_per_parameter: float = 9.0
@@ -26,12 +26,12 @@ class DiagnosisOptions:
     min_used_share: float = 0.8
     # an effect of more coefficients than this share of the numbers read is not tested; assumed
     max_coefficients_per_number: float = 0.5
-    # bounds of geometric parameters: further than a calibration's, which a strong effect would press against; assumed
+    # bounds of geometric parameters: wider than a calibration's, at which a strong effect would end; assumed
     parameter_bound_rad: float = 0.3
     parameter_bound_mm: float = 100.0
     # priors of the errors of links and joints, 1 sigma: machining and assembly leave a tenth of these; readings that
-    # determine a number outweigh it, and what none determines stays near the nominal robot. Frames, targets and zeros
-    # of drives may be anywhere within the bounds; assumed
+    # determine a parameter outweigh it, and parameters that none determines stay near the nominal robot. Frames,
+    # targets and zeros of drives may be anywhere within the bounds; assumed
     body_error_sd_rad: float = 0.03
     body_error_sd_mm: float = 10.0
 
@@ -130,8 +130,8 @@ class DiagnosisOptions:
     min_named_probability: float = 0.7
     # with something unexplained an effect that makes less of the gap by itself may be a part of that; the usual 5 %
     min_share_with_unexplained: float = 0.05
-    # an effect that does what the remainder does has to be so many times as large, or it may be a part of that which
-    # has the law's form by chance; assumed
+    # an effect that follows the variable of the remainder has to be so many times as large: a smaller one may be a part
+    # of the remainder that has its form by chance; assumed
     min_size_per_remainder: float = 2.0
     # causes of less probability are excluded; the usual 5 %
     min_possible_probability: float = 0.05
@@ -167,7 +167,7 @@ class DiagnosisOptions:
     # --- held-out points and detectability ---
     # where a trajectory was driven once only, its runs are cut into stretches of about so many points; assumed
     points_per_stretch: int = 5
-    # every so-manieth stretch is left out: the usual five folds
+    # number of folds of stretches: the usual five
     stretch_folds: int = 5
     # more runs than this share folds; bounds the time
     max_run_folds: int = 20
@@ -205,9 +205,9 @@ class DiagnosisOptions:
     # --- notes and text of the answer ---
     # standard errors from which on a note says that payload or tilt differ from the stated ones; the usual 3 sigma
     min_nuisance_z: float = 3.0
-    # the same of a drive's zero; assumed, a false note has somebody master a robot that needs it not
+    # the same of a drive's zero; assumed, a false note makes somebody reset the zeros of a robot without need
     min_zero_z: float = 4.0
-    # a number most of whose variance comes from the priors is not determined by the readings
+    # a parameter most of whose variance comes from the priors is not determined by the readings
     max_prior_variance_share: float = 0.5
     # how far the instrument's frame, a tool or a target may be off its stated place; assumed
     outside_error_mm: float = 10.0
@@ -227,8 +227,8 @@ class DiagnosisOptions:
     max_mentioned_share: float = 1.5
 
     # --- experiment design: the next runs and poses ---
-    # speed of a fast pass where no `limits` state it, and mass that a loaded pass adds where neither they nor the
-    # efforts of the robot's file say how much; assumed
+    # speed of a fast pass where no `limits` state it, and mass that a loaded pass adds where neither `limits` nor the
+    # efforts of the robot's file determine it; assumed
     default_fast_pass_mm_s: float = 300.0
     default_added_payload_kg: float = 5.0
     # a payload that is not stated is at most this share of what the robot itself moves, and at least so much; assumed
@@ -300,7 +300,8 @@ class DiagnosisOptions:
     # --- corrected files ---
     # a corrected file that leaves more than so many times what the diagnosis leaves gets a note
     max_file_remainder_ratio: float = 1.1
-    # poses at which a corrected file is compared with the diagnosis beside the measured ones: their rms is good to 5 %
+    # poses at which a corrected file is compared with the diagnosis in addition to the measured ones: their rms is good
+    # to 5 %
     fresh_poses: int = 200
     # lines of the grid along each axis; assumed
     drive_table_grid_lines: int = 7

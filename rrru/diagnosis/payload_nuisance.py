@@ -1,21 +1,21 @@
-"""Weight that nobody knows exactly: a load that was not told, a base that is not level.
+"""Nuisance parameters of payload and tilt: a mass that was not stated, a base that is not level.
 
-What gives way does so under loads that are linear in the mass m at the platform and in the lean w of the base
-(`rrru.kinematics.dynamics.load_slopes`). What both may be off by is fitted together with everything else, wherever an
-effect acts that gives way:
+A compliant part deflects under loads that are linear in the mass m at the platform and in the tilt w of the base
+(`rrru.kinematics.dynamics.load_slopes`). The errors of both are fitted together with everything else, wherever a
+compliant effect acts:
 
-    dm ~ N(0, (share m)^2),    w_x, w_y ~ N(0, lean^2)
+    dm ~ N(0, (share m)^2),    w_x, w_y ~ N(0, tilt^2)
 
-It is one weight for all effects, and no effect itself: where nothing gives way it changes nothing. Evidence is averaged
-over four cases: the mass is as it was told or it is not, and the robot stands level or it does not.
+Payload and tilt are common to all effects and no effects themselves: without compliance they change nothing. Evidence
+is averaged over four cases: the mass is as stated or not, and the base is level or not.
 
-The columns of the weight are a linearisation about the coefficients found under weak priors. `nuisance_evidence` has
-the exact product. On a 3-RRRU and a six-axis arm the log evidence, averaged over prior scales, is 0.25 nats off at most
-where the effect acts that bears the loads, and 1.2 nats where another one acts or none.
+The columns of payload and tilt are a linearisation about the coefficients found under weak priors. `nuisance_evidence`
+has the exact product. The error of the log evidence, averaged over prior scales, was computed for a 3-RRRU and a
+six-axis arm. It is 0.25 nats at most where the compliant effect acts, and 1.2 nats where another one acts or none.
 
-ASSUME even odds of each: masses come from a scale or a drawing, good to 3 %, or are guessed within 30 % (of what hangs
-at the platform; where nothing was told there, by a tenth of all that moves, as an arm is made to carry); the robot
-stands level within a tenth of a degree, or it leans by a degree.
+ASSUME even odds of each. Masses come from a scale or a drawing, good to 3 %, or are guessed within 30 % of what hangs
+at the platform. Where no mass is stated there, the error is a tenth of all that moves, as an arm is made to carry. The
+base is level within a tenth of a degree, or it is tilted by a degree.
 """
 
 from dataclasses import replace
@@ -30,7 +30,7 @@ from rrru.diagnosis.options import OPTIONS
 from rrru.kinematics.dynamics import carried_kg, level_axes
 from rrru.kinematics.point_masses import PLATFORM
 
-# its name beside effects, and that of its mass
+# name of payload and tilt in tables of effects, and name of the mass among them
 WEIGHT, _EXTRA = "weight", "extra_kg"
 # probabilities that a mass, or a tilt, is as stated and that it is not, each with its ratio of standard deviations
 _CASES = (
@@ -40,23 +40,24 @@ _CASES = (
 
 
 def weight_names(robot):
-    """Names of what the weight may be off by: mass at the platform, turns of the base about the level axes."""
+    """Names of the nuisance parameters: mass at the platform, tilts of the base about the level axes."""
     return (_EXTRA, *(f"lean_{'xyz'[axis]}" for axis in level_axes(robot)))
 
 
-def doubts_of(motion, masses):
-    """What the weight along a Motion may be off by: standard deviations and bounds (low, high) by name.
+def nuisance_priors(motion, masses):
+    """Standard deviations and bounds (low, high) by name of the errors of payload and tilt along a Motion.
 
-    All zero where nothing has weight.
+    All zero where no part has mass.
     """
     robot, point_masses = motion.robot, getattr(motion.robot, "point_masses", ())
-    own = sum(point_mass.mass_kg for point_mass in point_masses if point_mass.joint == PLATFORM)
-    told = own + carried_kg(robot, masses, np.nan_to_num(motion.payload_kg))
-    extra = OPTIONS.payload_sd_per_stated_mass * float(told.max(initial=0.0))
+    platform_kg = sum(point_mass.mass_kg for point_mass in point_masses if point_mass.joint == PLATFORM)
+    stated_kg = platform_kg + carried_kg(robot, masses, np.nan_to_num(motion.payload_kg))
+    extra = OPTIONS.payload_sd_per_stated_mass * float(stated_kg.max(initial=0.0))
     extra = extra or OPTIONS.payload_sd_per_robot_mass * sum(point_mass.mass_kg for point_mass in point_masses)
     nuisance_sd = extra, *(2 * [OPTIONS.tilt_sd_rad if extra else 0.0])
-    bounds = [(-OPTIONS.nuisance_bound_sd * doubt, OPTIONS.nuisance_bound_sd * doubt) for doubt in nuisance_sd]
-    bounds[0] = -OPTIONS.max_missing_mass_share * float(told.min(initial=np.inf) if len(told) else 0.0), bounds[0][1]
+    bounds = [(-OPTIONS.nuisance_bound_sd * sd, OPTIONS.nuisance_bound_sd * sd) for sd in nuisance_sd]
+    least_kg = float(stated_kg.min(initial=np.inf) if len(stated_kg) else 0.0)
+    bounds[0] = -OPTIONS.max_missing_mass_share * least_kg, bounds[0][1]
     return tuple(dict(zip(weight_names(robot), values, strict=True)) for values in (nuisance_sd, bounds))
 
 
@@ -65,13 +66,13 @@ def as_found(problem, prior_scales):
     return posterior_mean(problem, problem.scale(prior_scales)[0])
 
 
-def borne(problem, count, blocks, steps, found, grams):
-    """The MarginalProblem of so many terms with what the weight may be as further coefficients.
+def with_nuisance(problem, count, blocks, steps, found, grams):
+    """The MarginalProblem of so many terms with the errors of payload and tilt as further coefficients.
 
-    blocks: by number of a term that gives way the matrix (c, k) of its own k coefficients' coordinates, and the
-    numbers (q, c) of the columns that a step of each of q numbers of the weight makes of its columns; steps: of the
-    weight, see `rrru.diagnosis.state.LinearizedProblem`; found (k,): the coefficients that such a step changes, the
-    same at all levels; grams: as in `MarginalProblem.of`.
+    blocks: by number of a compliant term the matrix (c, k) from its k coefficients to coordinates, and the numbers
+    (q, c) of the columns of its changes by a step of each of q nuisance parameters; steps: of the nuisance
+    parameters, see `rrru.diagnosis.state.LinearizedProblem`; found (k,): the coefficients that such a step changes,
+    the same at all levels; grams: as in `MarginalProblem.of`.
     """
     means = np.array([step[-1] for step in steps])
     acting = {k: matrix @ found[problem.owner == k] for k, (matrix, _) in blocks.items()}
@@ -100,34 +101,35 @@ def borne(problem, count, blocks, steps, found, grams):
 
 
 def gained_over_cases(problem, prior_scales):
-    """`gained` of a MarginalProblem at prior_scales (m, terms), averaged over the cases of the weight."""
+    """`gained` of a MarginalProblem at prior_scales (m, terms), averaged over the cases of payload and tilt."""
     if not problem.weights:
         return gained(problem, problem.scale(prior_scales))
-    # where it is not free the weight stays as it is, no more probable than under the least prior scales that leave it
-    # free
+    # where the nuisance parameters are not free they stay as stated, no more probable than under the least prior scales
+    # that leave them free
     least = np.maximum(prior_scales, OPTIONS.min_prior_scale_per_size * problem.at_least)
     result = _over_cases(problem, problem.scale(least))
     narrow = (least > prior_scales).any(axis=1)
     if narrow.any():
         as_it_is = problem.scale(np.concatenate([prior_scales[narrow], least[narrow]]))
-        # under a prior too narrow for the coefficients the weight's columns, as large as these, would stand for them
+        # under a prior too narrow for the coefficients the nuisance columns, as large as these, would replace them
         as_it_is[:, -len(problem.weights) :] = OPTIONS.fixed_nuisance_sd_ratio
-        own, at_least = np.split(gained(replace(problem, about=np.zeros_like(problem.about)), as_it_is), 2, axis=1)
-        result[:, narrow] = own + np.minimum(result[:, narrow] - at_least, 0.0)
+        fixed, at_least = np.split(gained(replace(problem, about=np.zeros_like(problem.about)), as_it_is), 2, axis=1)
+        result[:, narrow] = fixed + np.minimum(result[:, narrow] - at_least, 0.0)
     return result
 
 
 def mean_over_cases(problem, prior_scales):
     """Mean (k,) of the coefficients of a MarginalProblem of one level at prior_scales (1, terms).
 
-    Of a mixture of the cases of the weight, which is always free: the prior scales are raised to where it is.
+    It is the mean of the mixture over the cases of payload and tilt, which are always free: the prior scales are raised
+    until they are.
     """
     share, scales = _mixture(problem, prior_scales)
     return share @ [posterior_mean(problem, scale) for scale in scales]
 
 
 def over_cases(problem, prior_scales):
-    """`mean_over_cases` and the covariance (k, k), which does not know of positive coefficients."""
+    """`mean_over_cases` and the covariance (k, k), without the constraint on positive coefficients."""
     share, scales = _mixture(problem, prior_scales)
     means = np.array([posterior_mean(problem, scale) for scale in scales])
     spreads = np.array([posterior_covariance(problem, scale) for scale in scales])
@@ -137,7 +139,7 @@ def over_cases(problem, prior_scales):
 
 
 def _mixture(problem, prior_scales):
-    """Probabilities (c,) of the cases of a weight that is free after the data, and prior deviations (c, k) in each."""
+    """Posterior probabilities (c,) of the cases of free payload and tilt, and prior deviations (c, k) in each."""
     if not problem.weights:
         return np.ones(1), problem.scale(prior_scales)
     log, scales = _in_cases(problem, problem.scale(np.maximum(prior_scales, problem.at_least)))
@@ -146,7 +148,7 @@ def _mixture(problem, prior_scales):
 
 
 def _over_cases(problem, scale):
-    """`gained` (levels, m) at prior deviations (m, k) of a weight that is free, averaged over its cases."""
+    """`gained` (levels, m) at prior deviations (m, k) with free payload and tilt, averaged over their cases."""
     log, scales = _in_cases(problem, scale)
     return log_sum_exp(gained(problem, scales).reshape(len(problem.gram), len(scale), len(log)) + log)
 
@@ -154,9 +156,9 @@ def _over_cases(problem, scale):
 def _in_cases(problem, scale):
     """Logarithms (c,) of the probabilities of all cases, and prior deviations (m c, k) of rows (m, k) in each."""
     log, shares = _cases(problem.weights)
-    each = np.repeat(scale, len(log), axis=0)
-    each[:, -shares.shape[1] :] *= np.tile(shares, (len(scale), 1))
-    return log, each
+    scales = np.repeat(scale, len(log), axis=0)
+    scales[:, -shares.shape[1] :] *= np.tile(shares, (len(scale), 1))
+    return log, scales
 
 
 def cases_of(names):

@@ -1,4 +1,4 @@
-"""From the evidence of hypotheses to probabilities: of effects, of sets of them, and of what no effect explains."""
+"""Posterior probabilities of effects, of sets of them, and of a discrepancy, from the evidence of hypotheses."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -43,9 +43,9 @@ class Posterior:
 
     @classmethod
     def of(cls, weighed, apart=0.0, expanded=1.0):
-        """Of a list of Weighed hypotheses: single effects, and sets that are not negligible.
+        """The Posterior of a list of Weighed hypotheses without negligible sets of several effects.
 
-        Single effects stay, however improbable: tables show what each does alone.
+        Single effects stay, however improbable: tables show each of them alone.
         """
         least = max(one.height for one in weighed) - OPTIONS.negligible_nats
         chosen = [one for one in weighed if one.height > least or len(one.hypothesis.terms) <= 1]
@@ -96,8 +96,8 @@ class Posterior:
     def without(self, effect):
         """The posterior with an effect ruled out."""
         keep = ~self._holding(effect)
-        kept = tuple(h for h, fine in zip(self.hypotheses, keep, strict=True) if fine)
-        return Posterior(kept, self.log_weights[keep], self.unexplained[keep], self.apart, self.expanded)
+        remaining = tuple(h for h, keeps in zip(self.hypotheses, keep, strict=True) if keeps)
+        return Posterior(remaining, self.log_weights[keep], self.unexplained[keep], self.apart, self.expanded)
 
     @property
     def height(self):
@@ -117,7 +117,7 @@ class Posterior:
     def best_of(self, effects, unexplained=None):
         """The hypothesis of highest weight with exactly these effects, and its level; None where there is none.
 
-        Unless `unexplained` is asked for, one without unknown functions.
+        Unless `unexplained` is asked for, one without discrepancy functions.
         """
         hidden = set() if unexplained is None else set(UNKNOWN)
         rows = [k for k, h in enumerate(self.hypotheses) if h.effects - hidden == effects]
@@ -129,7 +129,7 @@ class Posterior:
         return self._best(rows, weights)
 
     def best_where(self, condition):
-        """The hypothesis of highest weight without unknown functions whose effects meet a condition, and its level.
+        """The hypothesis of highest weight without discrepancy functions whose effects meet a condition, and its level.
 
         condition: from a frozenset of names to a bool. None where there is none.
         """
@@ -146,7 +146,7 @@ class Posterior:
         return self.hypotheses[rows[row]], int(level)
 
     def _holding(self, effect):
-        """Which hypotheses (h,) hold an effect."""
+        """Which hypotheses (h,) contain an effect."""
         return np.array([effect in h.effects for h in self.hypotheses])
 
 
@@ -169,7 +169,7 @@ class Weigher:
             self._effects[name] = np.log(weights) - np.log(len(kinds)) + coordinates.log_prior
 
     def weighed(self, hypothesis, least=-np.inf):
-        """The Weighed hypothesis; least: below this log weight nothing is looked at for what it leaves unexplained."""
+        """The Weighed hypothesis; least: log weight below which it counts as unexplained without a test."""
         evidence, log_weights = self._evidence, hypothesis.evidence + self.terms(hypothesis.terms)
         if not log_weights.max() > least:
             unexplained = np.ones(len(log_weights), dtype=bool)
@@ -190,9 +190,9 @@ class Weigher:
         return total
 
     def _of_levels(self, unexplained):
-        """Of the discrepancy's levels (levels,): half of what is not unexplained is none at all."""
+        """Log prior (levels,) of the discrepancy's levels: half of the part that is not unexplained has none at all."""
         if unexplained.all():
-            # its unknown function has paid for it
+            # the prior of its discrepancy function has been counted
             return np.log(np.where(np.arange(len(unexplained)) == 0, 0.5, 0.5 / (len(unexplained) - 1)))
         explained, spare = 1.0 - self._prior.unexplained, np.count_nonzero(~unexplained) - 1
         result = np.full(len(unexplained), explained * (0.5 / spare if spare else 1.0))

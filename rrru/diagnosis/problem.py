@@ -1,7 +1,7 @@
-"""One campaign as the diagnosis sees it: usable points, the calibrated sim, every effect's signature, the exact sim.
+"""One campaign as the diagnosis sees it: usable points, calibrated model, signature of every effect, exact model.
 
-The sim with effects is the exact closure of the plant; a hypothesis is fitted on its linearisation, renewed about the
-best one found. Lengths in mm, angles in rad.
+The model with effects is the exact closure of the robot. A hypothesis is fitted on its linearisation, which is renewed
+about the best one found. Lengths in mm, angles in rad.
 """
 
 from collections.abc import Callable
@@ -38,9 +38,9 @@ class Case:
     library: effects by name that the campaign can test, and after them the functions of
     `rrru.diagnosis.discrepancy_basis` that it can; untestable: name to the reason for the other effects; noise_mm:
     deviation per axis; arm_mm: of `rrru.kinematics.readings.Readings`; noise: its NoiseModel, white where there is
-    none; beside_scale: factor by which rows of reflectors beside the robot count, so that they have the noise of the
+    none; beside_scale: weight of the rows of reflectors that are not on the robot, so that they have the noise of the
     others; motion_at: from where the robot stands to the motion with the loads there, see
-    `rrru.effects.motion.make_motion`; nuisance_sd, bounds: what the weight may be off by, see
+    `rrru.effects.motion.make_motion`; nuisance_sd, bounds: of the errors of payload and tilt, see
     `rrru.diagnosis.payload_nuisance`; known: effect to the points (N,) at which the campaign has all that the effect
     needs, of the effects that lack something at a used point.
     """
@@ -70,12 +70,12 @@ class Case:
         if not self.mechanism.stages:
             return block
         usual = {"mm": OPTIONS.body_error_sd_mm, "rad": OPTIONS.body_error_sd_rad}
-        of_bodies = np.minimum(block.sd, [usual[unit] for unit in block.units])
-        return replace(block, sd=np.where(self.mechanism.stages[-1], block.sd, of_bodies))
+        body_sd = np.minimum(block.sd, [usual[unit] for unit in block.units])
+        return replace(block, sd=np.where(self.mechanism.stages[-1], block.sd, body_sd))
 
     @property
     def effects(self):
-        """The library without the unknown functions."""
+        """The library without the functions of the discrepancy."""
         return {name: effect for name, effect in self.library.items() if name not in UNKNOWN}
 
     @cached_property
@@ -84,7 +84,7 @@ class Case:
         return rows.readings(self.measurements, self.arm_mm)
 
     @cached_property
-    def _kept(self):
+    def _used_rows(self):
         """Rows (m,) of the used points among those of all readings."""
         points = np.arange(len(self.used)) if self.readings is None else self.readings.rows
         return np.flatnonzero(self.used[points])
@@ -96,23 +96,23 @@ class Case:
         return passes_points(self.measurements) or follows_path(command, run)
 
     @cached_property
-    def beside(self):
-        """Which rows (m,) are of reflectors beside the robot."""
-        on_world = rows.on_the_world(self.measurements)
-        return np.zeros(len(self), dtype=bool) if on_world is None else on_world[self.at]
+    def on_world(self):
+        """Which rows (m,) are of reflectors that are not on the robot."""
+        flags = rows.on_the_world(self.measurements)
+        return np.zeros(len(self), dtype=bool) if flags is None else flags[self.at]
 
     def of_rows(self, values):
-        """Of values (n, 3, ..) of all that was read those of the rows (m, 3, ..), as they count."""
-        kept = values[self._kept]
+        """Values (m, 3, ..) of the used rows, weighted, from those (n, 3, ..) of all that was read."""
+        used = values[self._used_rows]
         if self.beside_scale == 1.0:
-            return kept
-        scale = np.where(self.beside, self.beside_scale, 1.0)
-        return kept * scale.reshape(-1, *[1] * (kept.ndim - 1))
+            return used
+        scale = np.where(self.on_world, self.beside_scale, 1.0)
+        return used * scale.reshape(-1, *[1] * (used.ndim - 1))
 
     @cached_property
     def at(self):
         """Number (m,) of the point that each row was read at."""
-        return self._kept if self.readings is None else self.readings.rows[self._kept]
+        return self._used_rows if self.readings is None else self.readings.rows[self._used_rows]
 
     @cached_property
     def stop(self):
@@ -130,12 +130,12 @@ class Case:
     @cached_property
     def positions(self):
         """Which rows (m,) are positions."""
-        return self._kept < len(self.used)
+        return self._used_rows < len(self.used)
 
     @cached_property
     def on_robot(self):
-        """Which rows (m,) are positions of points on the robot: a distance in mm that is stated is one of these."""
-        return self.positions & ~self.beside
+        """Which rows (m,) are positions of points on the robot, the only ones that stated distances in mm are about."""
+        return self.positions & ~self.on_world
 
     @property
     def count(self):
@@ -155,10 +155,10 @@ class Case:
     @cached_property
     def series(self):
         """Numbers (m,) of what follows one another smoothly: runs, of each reflector, orientations apart."""
-        return reading_series(self.measurements, self.readings)[self._kept]
+        return reading_series(self.measurements, self.readings)[self._used_rows]
 
     def by_point(self, values):
-        """Values (m, 3, ..) of rows as those of the used points (n, 3 or 6, ..), zero where no orientation was read."""
+        """Values (n, 3 or 6, ..) of used points from those (m, 3, ..) of rows, zero where no orientation was read."""
         if self.positions.all():
             return values
         result = np.zeros((self.count, 6, *values.shape[2:]))
@@ -188,7 +188,7 @@ class Case:
         return self if rows.all() else self.without(~rows)
 
     def with_approach(self, state):
-        """The case with the senses in which the drives arrive as a state and the readings tell them."""
+        """The case with the senses in which the drives arrive, as a state and the readings determine them."""
         if not np.isfinite(self.motion.approach).any():
             return self
         approach = np.where(np.isfinite(self.motion.approach), 0.0, np.nan)
@@ -204,8 +204,8 @@ class Case:
     def standing(self, state):
         """The case with the loads where the robot of a state stands, if its platform can turn.
 
-        Where positions alone were read a calibration may turn the platform as it likes: its turn does not count then.
-        What the weight changes of the loads stays as it was: a sag changes that by a share of itself.
+        Where positions alone were read, the orientation of the platform is not identifiable and does not count.
+        Derivatives of the loads by payload and tilt stay as they were: a sag changes them by a share of itself.
         """
         if not self.mechanism.orients:
             return self
@@ -229,13 +229,13 @@ class Case:
         """Measured positions (N, 3)."""
         return rows.measured(self.measurements)
 
-    def sim(self, deviations):
-        """Positions (N, 3) of the tool by the calibrated sim without effects."""
+    def model_positions(self, deviations):
+        """Positions (N, 3) of the tool by the calibrated model without effects."""
         actuators, command = self.driven
         return self.mechanism.forward(actuators, deviations, command)
 
     def weight(self, state):
-        """What the weight of a state is off by, by name."""
+        """Errors of payload and tilt of a state, by name."""
         return dict.fromkeys(self.nuisance_sd, 0.0) | state.weight
 
     @last_kept_of
@@ -259,21 +259,21 @@ class Case:
         """The TwistMap of all points at a state's poses; see `rrru.kinematics.robot.Robot.map`."""
         actuators, _ = self.driven
         if self.readings is None and not state.effects:
-            return self.mechanism.map_at(actuators, self.sim(state.deviations), state.deviations)
+            return self.mechanism.map_at(actuators, self.model_positions(state.deviations), state.deviations)
         return self.mechanism.map(actuators, *self.posed(state), self.readings)
 
     def left(self, state):
-        """What is read minus the sim corrected by a state, of all points: positions (N, 3), then orientations.
+        """Readings minus the model corrected by a state, of all points: positions (N, 3), then orientations.
 
-        The sim is the exact closure where the state has effects, the calibrated one where it has none.
+        The model is the exact closure where the state has effects, the calibrated one where it has none.
         """
         if self.readings is not None:
             return lacking(self.mechanism, self.readings, *self.posed(state))
-        model = self.mechanism.measured(*self.posed(state)) if state.effects else self.sim(state.deviations)
+        model = self.mechanism.measured(*self.posed(state)) if state.effects else self.model_positions(state.deviations)
         return self._measured - model
 
     def by_other(self, robot, poses, twists):
-        """What is read minus another robot at Poses (N) under twists (N or 1, sites, 6), of the used points (m, 3)."""
+        """Readings minus another robot at Poses (N) under twists (N or 1, sites, 6), of the used points (m, 3)."""
         if self.readings is not None:
             return self.of_rows(lacking(robot, self.readings, poses, twists))
         return self.of_rows(self._measured - robot.measured(poses, twists))
@@ -283,5 +283,5 @@ class Case:
         return self.of_rows(self.left(state))
 
     def linearise(self, state, keys=None):
-        """The sim linearised about a state, see `rrru.diagnosis.linearise`."""
+        """The model linearised about a state, see `rrru.diagnosis.linearise`."""
         return linearised(self, state, keys)

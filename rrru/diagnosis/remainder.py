@@ -1,11 +1,11 @@
-"""What the unexplained part of a gap looks like: which variable it follows, how smoothly, and how large it is.
+"""The unexplained part of a gap: which variable it depends on, how smoothly, and how large it is.
 
-A Gaussian process of one variable at a time is fitted to what the verdict's model and its calibration leave: a function
-f of a drive's value, which makes J f of the positions (J: derivative by the drive), or a function of the place, the
-time, the payload or the speed for each axis, or steps with the sense of motion of the drives. Its covariance is
-a^2 exp(-d^2 / (2 l^2)) of the distance d, by its values at inducing points (C. Rasmussen and C. Williams, Gaussian
-Processes for Machine Learning, 2006, sec. 8.3); a and l have the highest marginal likelihood of a grid. What it
-predicts of a fold, a fifth of all stretches of five points, comes from the others.
+A Gaussian process of one variable at a time is fitted to the residuals of the verdict's model with its calibration. It
+is a function f of a drive's value, which moves the positions by J f (J: derivative by the drive). Or it is a function
+of the place, the time, the payload or the speed for each axis, or steps with the sense of motion of the drives. Its
+covariance is a^2 exp(-d^2 / (2 l^2)) of the distance d, by its values at inducing points (C. Rasmussen and C. Williams,
+Gaussian Processes for Machine Learning, 2006, sec. 8.3); a and l have the highest marginal likelihood of a grid. Each
+fold, a fifth of all stretches of five points, is predicted from the others.
 """
 
 from dataclasses import dataclass
@@ -48,7 +48,7 @@ def remainder_rows(inference):
     case = inference.case
     rows = case.on_robot
     linear = inference.evidence.linear
-    # under a smooth discrepancy a fit leaves to that what the calibration could take away
+    # a fit with a smooth discrepancy leaves to that what the calibration could absorb
     left, drive = _without_calibration(case.residual(inference.state), linear, rows), linear.drive[rows]
     stretch = within(case.run, case.stop) // OPTIONS.points_per_stretch + case.run
     fold = (stretch % OPTIONS.stretch_folds)[rows]
@@ -64,11 +64,12 @@ def remainder_rows(inference):
 
 
 def followed_alike(inference, rows, names):
-    """Which of some effects of the fit do what the remainder does, and the remainder's rms in mm.
+    """Which of some effects of the fit follow the same variable as the remainder, and the remainder's rms in mm.
 
-    rows: of `gap_remainder`; names: of effects. Where one variable predicts most of the remainder, an effect is such a
-    one if its law knows that variable alone and most of its own part is a function as smooth as the one found: laws
-    that need the time for the time, laws that need nothing but the drives' values for these and for the place.
+    rows: of `gap_remainder`; names: of effects. It is for a remainder of which one variable predicts most. An effect is
+    such a one if it depends on that variable alone and most of its part is a function as smooth as the one found. For
+    the time these are effects that need the time, for the drives' values and the place effects that need nothing but
+    the drives' values.
     """
     best = rows.iloc[0] if len(rows) else None
     if best is None or best["explained"] < OPTIONS.min_followed_share:
@@ -85,7 +86,7 @@ def followed_alike(inference, rows, names):
         fitted = design @ np.linalg.lstsq(design, part, rcond=1e-3)[0]
         if (
             key[0] in names
-            and _knows(case.effects[key[0]], best["follows"])
+            and _depends_on(case.effects[key[0]], best["follows"])
             and ((part - fitted) ** 2).sum() < (1.0 - OPTIONS.min_followed_share) * (part**2).sum()
         ):
             found.append(key[0])
@@ -93,16 +94,16 @@ def followed_alike(inference, rows, names):
 
 
 def _without_calibration(values, linear, rows):
-    """What the calibration leaves of values (m, 3) at some rows, by plain least squares there."""
-    own = values[rows]
-    columns = linear.base[rows].reshape(own.size, -1)
+    """Residuals of values (m, 3) at some rows after a plain least-squares calibration there."""
+    chosen = values[rows]
+    columns = linear.base[rows].reshape(chosen.size, -1)
     size = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
-    fitted = columns / size @ np.linalg.lstsq(columns / size, own.ravel(), rcond=1e-9)[0]
-    return own - fitted.reshape(own.shape)
+    fitted = columns / size @ np.linalg.lstsq(columns / size, chosen.ravel(), rcond=1e-9)[0]
+    return chosen - fitted.reshape(chosen.shape)
 
 
-def _knows(effect, follows):
-    """Whether a law knows the variable, in words, and no other but those that it determines."""
+def _depends_on(effect, follows):
+    """Whether an effect depends on the variable, in words, and on no other except those that it determines."""
     return "time_s" in effect.needs if follows == "the time" else not effect.needs
 
 
@@ -149,10 +150,10 @@ def _design(variable, functions, drive):
     if variable.steps:
         return drive * functions[:, None, :]
     if variable.drive is not None:
-        own = drive[:, :, variable.drive]
+        response = drive[:, :, variable.drive]
         # the function has the drive's unit, its size is that of what it makes
-        own = own / max(float(np.sqrt((own**2).mean())), 1e-300)
-        return own[:, :, None] * functions[:, None, :]
+        response = response / max(float(np.sqrt((response**2).mean())), 1e-300)
+        return response[:, :, None] * functions[:, None, :]
     return (functions[:, None, None, :] * np.eye(3)[:, :, None]).reshape(len(functions), 3, -1)
 
 
@@ -205,8 +206,8 @@ class _Regression:
         result, penalty = np.empty_like(self._data), self._variance / amplitude**2 * np.eye(len(self._gram))
         for number in np.unique(fold):
             out = fold == number
-            own = self._design[out].reshape(-1, len(self._gram))
-            gram = self._gram - own.T @ own + penalty
-            moment = self._moment - own.T @ self._data[out].ravel()
-            result[out] = (own @ np.linalg.solve(gram, moment)).reshape(-1, 3)
+            design = self._design[out].reshape(-1, len(self._gram))
+            gram = self._gram - design.T @ design + penalty
+            moment = self._moment - design.T @ self._data[out].ravel()
+            result[out] = (design @ np.linalg.solve(gram, moment)).reshape(-1, 3)
         return result

@@ -1,4 +1,4 @@
-"""Sentences on what a fit found of the robot apart from its effects."""
+"""Sentences on results of a fit other than the effects: zero offsets, payload and tilt, noise, convergence."""
 
 import numpy as np
 
@@ -17,8 +17,9 @@ def zero_notes(estimate, robot):
     """Sentences on drives whose zeros are far off, such as "joint 4: zero, or the part that it moves, is off by 2
     degrees (95 %: 1.98 to 2.02)".
 
-    estimate: of the robot's geometric errors. A zero that is one number with a frame, or with the place of what is
-    read, has a size only where its drive slides, and one whose variance comes from the priors is not determined.
+    estimate: of the robot's geometric errors. A zero that is not separately identifiable from a frame, or from the
+    place of a target, has a combined offset with that where its drive slides. A zero whose variance comes from the
+    priors is not determined.
     """
     block, names = estimate.parameters.places[GEOMETRY], robot.parameters.names
     known = dict(zip(names, range(block.start, block.stop), strict=True))
@@ -32,7 +33,7 @@ def zero_notes(estimate, robot):
             continue
         unit, scale = ("degrees", np.degrees(1.0)) if drive.unit == "rad" else ("mm", 1.0)
         size = _sized(scale * value, scale * estimate.intervals[number], unit)
-        if others := _one_with(robot, name, LARGE[drive.unit]):
+        if others := _confounded_with(robot, name, LARGE[drive.unit]):
             both = f"{drive.site}: zero and {others} are not separately identifiable"
             if drive.unit == "rad":
                 # a shift of a frame or of a target across the axis does what a turn does: no number is the zero's alone
@@ -48,12 +49,12 @@ def zero_notes(estimate, robot):
 def _sized(value, ends, unit):
     """A number with its 95 % interval (2,), to two digits of its half width."""
     places = max(1 - int(np.floor(np.log10(max(0.5 * float(np.ptp(ends)), 1e-12)))), 0)
-    value, low, high = (f"{one:.{places}f}" for one in (value, *ends))
+    value, low, high = (f"{number:.{places}f}" for number in (value, *ends))
     return f"{value} {unit} (95 %: {low} to {high})"
 
 
-def _one_with(robot, zero, least):
-    """What a zero is confounded with, in words: what imitates an offset of `least` where it has its usual error."""
+def _confounded_with(robot, zero, least):
+    """What a zero is confounded with, in words: errors of usual size that equal an offset of at least `least`."""
     usual = {"mm": OPTIONS.outside_error_mm, "rad": OPTIONS.outside_error_rad}
     on_platform = "the place of the target" if robot.legs.reflectors else "the place of the tool"
     others = (
@@ -64,9 +65,9 @@ def _one_with(robot, zero, least):
     return " and ".join(dict.fromkeys(others))
 
 
-def weight_notes(inference):
-    """Sentences on what the weight is surely off by, as far as the readings determine it."""
-    for name, unit, value, interval, determined in _weight_off(inference):
+def payload_notes(inference):
+    """Sentences on significant errors of payload and tilt that the readings determine."""
+    for name, unit, value, interval, determined in _significant_nuisance(inference):
         if determined:
             size = _sized(value, interval, unit)
             if unit == "kg":
@@ -75,20 +76,20 @@ def weight_notes(inference):
                 yield f"the base is tilted by {size} about {name[-1]}, the configuration assumes 0"
 
 
-def weight_doubts(inference):
-    """Sentences on what the weight seems to be off by where something else may be the reason."""
-    for name, unit, *_, determined in _weight_off(inference):
+def undetermined_payload_notes(inference):
+    """Sentences on significant errors of payload and tilt that are confounded with a compliance."""
+    for name, unit, *_, determined in _significant_nuisance(inference):
         if not determined:
             what = "a mass at the platform" if unit == "kg" else f"a tilt of the base about {name[-1]}"
             do = "measure with two loads" if unit == "kg" else "level the base"
             yield f"{what} and a compliance are not separately identifiable from these readings: {do}"
 
 
-def _weight_off(inference):
-    """Name, unit, value, 95 % interval and whether it is determined of each number of the weight that is surely off.
+def _significant_nuisance(inference):
+    """Name, unit, value, 95 % interval and whether determined, of each significant error of payload and tilt.
 
-    With one load all that gives way is in proportion to it: the mass is then measured against masses of the links that
-    nobody has weighed.
+    With one load all deflections are in proportion to it: the mass is then only relative to masses of the links, which
+    are not measured.
     """
     fit, case = inference.fit, inference.case
     estimate, weight = fit.estimate, fit.weight
@@ -123,12 +124,12 @@ def noise_notes(case, stated_mm, contradicted):
         yield f"{found}: the instrument is better"
 
 
-def posterior_notes(beliefs):
+def posterior_notes(posterior):
     """A sentence on a Posterior that depends on where its search began."""
-    if beliefs.apart > OPTIONS.max_searches_apart:
+    if posterior.apart > OPTIONS.max_searches_apart:
         yield (
             f"the search over sets of effects has not settled: two searches give probabilities that differ by up to "
-            f"{beliefs.apart:.2f}"
+            f"{posterior.apart:.2f}"
         )
 
 
@@ -137,4 +138,4 @@ def fit_notes(inference):
     end, terms = inference.fit.estimate.end, inference.fit.terms
     if not end.converged:
         names = ", ".join(term.effect for term in terms) or "the calibration"
-        yield f"the fit of {names} did not converge ({end.message}): its numbers are preliminary"
+        yield f"the fit of {names} did not converge ({end.message}): its values are preliminary"

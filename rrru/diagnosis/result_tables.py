@@ -24,7 +24,7 @@ _EMPTY |= dict.fromkeys(("heldout_gain", "heldout_gain_low", "heldout_gain_high"
 
 
 def details_of(inference, verdict, steps, residual_mm, generator, draws):
-    """Frames by table name, without the campaign; residual_mm (n, 3): measured minus calibrated sim."""
+    """Frames by table name, without the campaign; residual_mm (n, 3): measured minus calibrated model."""
     case, linear = inference.case, inference.case.linearise(inference.calibrated)
     exact = case.residual(inference.state) if inference.state.effects else None
     drive = drive_errors(case.by_point(residual_mm), case.by_point(linear.drive))
@@ -40,13 +40,13 @@ def details_of(inference, verdict, steps, residual_mm, generator, draws):
 
 def _attribute_rows(inference, verdict):
     """Rows of `gap_attribute`: every effect of the library, none and unexplained, with the Verdict's decision on it."""
-    beliefs, case = inference.posterior, inference.case
+    posterior, case = inference.posterior, inference.case
     result = [_effect_row(inference, name) for name in case.effects]
     result += [
         {"effect": name, "probability": 0.0, **_EMPTY, "note": f"not tested: {note}"}
         for name, note in case.untestable.items()
     ]
-    none, unknown = beliefs.sets().get((frozenset(), False), 0.0), beliefs.probability_unexplained
+    none, unknown = posterior.sets().get((frozenset(), False), 0.0), posterior.probability_unexplained
     result.append({"effect": "none", "probability": none, **_EMPTY})
     result.append({"effect": "unexplained", "probability": unknown, **_EMPTY})
     rows = pd.DataFrame(result)
@@ -68,14 +68,14 @@ def where(inference, effects):
 
 def _effect_row(inference, name):
     """The row of one testable effect."""
-    beliefs = inference.posterior
-    row = {"effect": name, "probability": beliefs.marginal(name), **_EMPTY}
-    holding = [h for h in beliefs.hypotheses if name in h.effects]
+    posterior = inference.posterior
+    row = {"effect": name, "probability": posterior.marginal(name), **_EMPTY}
+    holding = [h for h in posterior.hypotheses if name in h.effects]
     if not holding:
         return row | {"note": "far less probable than others"}
     best = max(holding, key=lambda h: h.evidence.max())
     row["log_evidence"] = float(best.evidence.max() - inference.evidence.on_library().none.max())
-    if per_leg(inference.case.library[name]) and (legs := beliefs.legs(name)):
+    if per_leg(inference.case.library[name]) and (legs := posterior.legs(name)):
         row["legs"] = str(max(legs, key=legs.get))
     single = max((h for h in holding if len(h.terms) == 1), key=lambda h: h.evidence.max(), default=None)
     if single:
@@ -109,7 +109,7 @@ def _set_rows(inference):
 
 
 def parameter_rows(inference):
-    """Rows of `gap_parameters`: all numbers of the corrected sim with standard errors."""
+    """Rows of `gap_parameters`: all parameters of the corrected model with standard errors."""
     fit, library = inference.fit, inference.case.library
     parameters, errors = inference.case.mechanism.parameters, fit.estimate.block_errors(GEOMETRY)
     intervals, places = fit.estimate.intervals, fit.estimate.parameters.places
@@ -134,10 +134,10 @@ def parameter_rows(inference):
                 effect.parameters, values, errors, ends, bound.tolist(), strict=True
             )
         ]
-    bounds, own = inference.case.bounds, intervals[places[WEIGHT]] if WEIGHT in places else ()
+    bounds, nuisance = inference.case.bounds, intervals[places[WEIGHT]] if WEIGHT in places else ()
     result += [
         (WEIGHT, name, unit, value, error, *interval, value in bounds[name])
-        for (name, unit, value, error), interval in zip(fit.weight, own, strict=True)
+        for (name, unit, value, error), interval in zip(fit.weight, nuisance, strict=True)
     ]
     numbers = ("value", "standard_error", "low_95", "high_95", "at_bound")
     return pd.DataFrame(result, columns=("effect", "parameter", "unit", *numbers))
@@ -174,23 +174,23 @@ def _effect_values(fit, library, term):
         fit.effect_covariance(term)[1],
         coordinates.to_values(state.effects[key], state.shape(library, key)),
     )
-    # a phase may have gone once round
+    # a phase may have passed a full turn
     differences = [(up - down, size) for up, down, size in value_steps(fit, library, term)]
     slope = np.stack([np.where(np.abs(step) > np.pi, 0.0, step) / size for step, size in differences], axis=-1)
     errors = np.sqrt(np.maximum(np.diag(slope @ covariance @ slope.T), 0.0))
     ends = values[:, None] + QUANTILE_95 * np.outer(errors, [-1.0, 1.0])
     numbers, intervals = fit.effect_numbers(term)
-    for row, own in enumerate(slope):
-        (followed,) = np.nonzero(own)
+    for row, slopes in enumerate(slope):
+        (followed,) = np.nonzero(slopes)
         if len(followed) == 1:
             number = followed[0]
-            ends[row] = np.sort(values[row] + own[number] * (intervals[number] - numbers[number]))
+            ends[row] = np.sort(values[row] + slopes[number] * (intervals[number] - numbers[number]))
     ends[~slope.any(axis=1)] = np.nan
     return values, errors, ends
 
 
 def _point_rows(inference, after, drive):
-    """Rows of `gap_points`; after (n, 3), drive (n, K): residuals of the corrected sim and errors of the drives."""
+    """Rows of `gap_points`; after (n, 3), drive (n, K): residuals of the corrected model and errors of the drives."""
     case = inference.case
     frame = case.measurements[["run", "trajectory", "point"]].reset_index(drop=True)
     before = case.left(inference.calibrated)[: len(frame)]

@@ -1,6 +1,4 @@
-"""Tables of the gap diagnosis: where what the calibrated sim gets wrong lies, which effect causes it, how far it
-shrinks.
-"""
+"""Tables of the gap diagnosis: where the calibrated model errs, which effect causes it, how far the gap shrinks."""
 
 from dataclasses import replace
 
@@ -26,12 +24,12 @@ where                  str    where the effects act, in words: a site, or the fi
     nothing acts
 confusable_with        str    what else may act, joined by a comma: effects, unexplained and none that are not in the
     verdict and have a probability above 0.05; empty where none
-groups                 str    effects that this campaign cannot tell apart, of which one acts, the most probable first,
-    which stands in effects: joined by |, groups by a semicolon; empty where none
+groups                 str    effects that are confounded in this campaign, of which one acts, the most probable first,
+    which is in effects: joined by |, groups by a semicolon; empty where none
 searches_apart         float  largest difference of a cause's probability between searches from different starts, 0 to 1
 noise_rms_mm
-gap_rms_mm             float  what the calibrated sim gets wrong, noise taken out
-gap_after_rms_mm       float  the same, expected of the corrected sim on held-out runs
+gap_rms_mm             float  residual error of the calibrated model, noise subtracted
+gap_after_rms_mm       float  the same, expected of the corrected model on held-out runs
 share_closed           float  share of the gap that the effects close, 0 to 1; below 0 where the correction makes it
     worse, on held-out runs
 share_closed_low       float  lower end, 95 %, 0 to 1; below 0 where the correction makes it worse, on held-out runs
@@ -39,7 +37,7 @@ share_closed_high      float  upper end, 95 %, 0 to 1; below 0 where the correct
 worst_x_mm             float  where the gap is largest, x, robot frame
 worst_y_mm             float  where the gap is largest, y, robot frame
 worst_z_mm             float  where the gap is largest, z, robot frame
-next_runs              str    runs that would tell the causes apart best; empty where none is needed, helps or can be
+next_runs              str    runs that would separate the causes best; empty where none is needed, helps or can be
     computed
 undecided              str    the two answers, joined by ' / ', between which it matters most to decide, where nothing
     that can be simulated would; empty elsewhere
@@ -53,7 +51,7 @@ dropped_points         int    outliers that the diagnosis left out
 notes                  str    what the data lack for a better answer; empty where nothing
 not_in_model           str    what was found and the robot's corrected file cannot hold; empty where nothing, or where
     the robot has no file
-no_answer              str    why no cause is named and no corrected file is written: numbers of the calibration at
+no_answer              str    why no cause is named and no corrected file is written: parameters of the calibration at
     their bounds, or an rms of many times the noise; empty where the answer holds, else effects is unexplained
 file_error_mm          float? rms distance of the corrected file's robot from the diagnosed one at the measured poses;
     null where no file was corrected
@@ -76,8 +74,8 @@ and is added to their gap.
 campaign
 part                   str    effect, or kind; of a covariance both effects
 kind                   str    effect; scatter: what does not repeat, noise above the stated; runs: offsets between runs;
-    unexplained: systematic and predicted by nothing; covariance: of two effects that imitate each other; sampling:
-    what the noise happens to leave; calibration: uncertainty of its numbers {effect, scatter, runs, unexplained,
+    unexplained: systematic and predicted by nothing; covariance: of two confounded effects; sampling: of this draw of
+    the noise; calibration: uncertainty of its parameters {effect, scatter, runs, unexplained,
     covariance, sampling, calibration}
 rms_mm                 float  root of its mean square, negative where that is
 share                  float  of the gap's mean square
@@ -86,7 +84,7 @@ share_high             float  upper end, 95 %, from the posterior
 probability            float? that the part is real; null where that is no question, or where no noise is stated
 
 ## gap_locate | tables/gap_locate.parquet | campaign factor level
-Where the gap lies: its variance split over the levels of each factor.
+Where the gap is largest: its variance by factor, split over the levels of each factor.
 --
 campaign
 factor                 str    what the points are split by {trajectory, region, direction, drive, motion_direction,
@@ -107,18 +105,18 @@ y_mm                   float? centre of the region, y, robot frame; null for oth
 z_mm                   float? centre of the region, z, robot frame; null for other factors
 
 ## gap_identifiability | tables/gap_identifiability.parquet | campaign effect
-What this campaign could tell about each effect, whatever was measured.
+Detectability and confounding of each effect in this campaign, whatever was measured.
 --
 campaign effect
 testable               bool   false where the campaign lacks what the effect needs
 visible_share          float? share of the effect's displacement that the calibration cannot absorb
 detectable_mm          float? gap rms, 3-D, above which this effect alone is found 9 times of 10 at 1 % false alarms
-imitated_by            str    the other effect that imitates it best; empty where none
-imitated_share         float? largest share of its visible gap that one other effect can imitate
-note                   str    why it cannot be tested or told apart; empty where it can
+imitated_by            str    the other effect that it is most confounded with; empty where none
+imitated_share         float? largest share of its visible gap that one other effect can reproduce
+note                   str    why it cannot be tested or separated; empty where it can
 
 ## gap_attribute | tables/gap_attribute.parquet | campaign effect
-Probability of each effect as a cause of the gap, none and unexplained included.
+Posterior probability of each effect as a cause of the gap, none and unexplained included.
 --
 campaign
 effect                 str    name in the library or of the user's, none or unexplained
@@ -169,7 +167,7 @@ kind                   str    held_out: on runs that were not fitted on; resimul
     full spatial closure; given_model, corrected_model: the robot's file as it came, and as it is written back, on all
     runs {held_out, resimulated, given_model, corrected_model}
 points
-rms_mm                 float  measured minus sim
+rms_mm                 float  measured minus model
 max_mm                 float  largest distance
 noise_rms_mm
 gap_rms_mm             float  rms with the noise taken out, 0 at least; at the last held-out step the error to expect
@@ -183,7 +181,7 @@ share_closed_high      float? upper end, 95 %, 0 to 1; below 0 where the correct
 
 ## gap_parameters | tables/gap_parameters.parquet | campaign effect parameter
 The corrected simulator: parameters of the effects in the verdict, the errors (effect: calibration) fitted with them,
-and, where one of them bears loads, what the weight is off by (effect: weight).
+and, where one of them is compliant, the errors of payload and tilt (effect: weight).
 --
 campaign effect
 parameter              str    name of the parameter
@@ -211,10 +209,10 @@ high_95                float  upper end of the 95 % interval
 worst                  bool   true where the error of this drive is largest
 
 ## gap_next_runs | tables/gap_next_runs.parquet | campaign rank
-Runs that would separate effects which this campaign cannot tell apart, best first.
+Runs that would separate effects which are confounded in this campaign, best first.
 --
 campaign
-rank                   int    1: tells most
+rank                   int    1: most informative
 run                    str    the run in words
 kind                   str    run: once more along a trajectory; poses: those of gap_next_poses, where no such run would
     rule a rival out {run, poses}
@@ -231,10 +229,10 @@ gain_nats              float  expected log evidence that the run adds
 Poses that would separate effects where no further run along a trajectory of the campaign would rule a rival out. Each
 is the middle of a straight pass from rest to rest, five points of which are read, both ends included. They lie in the
 box about the measured points, within the drives' ranges and clear of singularities; whether anything else is in the way
-there nobody has checked.
+there has not been checked.
 --
 campaign
-pose                   int    1: tells most; each further one tells most beside those before it
+pose                   int    1: most informative; each further one adds most to those before it
 from_{xyz}_mm          float  where the pass begins, robot frame
 to_{xyz}_mm            float  where it ends
 command_r{xyz}_rad     float? orientation of the platform, rotation vector; null where the drives cannot choose it
@@ -253,14 +251,14 @@ payload_kg             float  the campaign's largest
 time_s                 float  since the campaign's start: its end, as warm the robot is
 
 ## gap_points | campaigns/{campaign}/gap_points.parquet | run point
-The gap at every commanded point, before and after the effects are added to the sim.
+The gap at every commanded point, before and after the effects are added to the model.
 --
 run                    int    as in measurements
 trajectory             str    as in measurements
 point                  int    as in measurements
 command_{xyz}_mm       float  commanded position, robot frame
-before_{xyz}_mm        float? measured minus calibrated sim; null where nothing was measured
-after_{xyz}_mm         float? measured minus corrected sim, on held-out runs; null where it was not predicted
+before_{xyz}_mm        float? measured minus calibrated model; null where nothing was measured
+after_{xyz}_mm         float? measured minus corrected model, on held-out runs; null where it was not predicted
 drive_error1_rad       float? before, as equivalent error of drive angle 1; null near singularities
 drive_error2_rad       float? before, as equivalent error of drive angle 2; null near singularities
 drive_error3_rad       float? before, as equivalent error of drive angle 3; null near singularities
@@ -275,11 +273,11 @@ def tables_of(robot):
     """The tables of the diagnosis, with the columns of the robot's own drives."""
     more = range(4, len(robot.parts.drives) + 1)
     text = "before, as equivalent error of drive {}; null for drives of another unit and near singularities"
-    own = [Column(f"drive_error{k}_{u}", "float64", text.format(k), True) for u in ("rad", "mm") for k in more]
+    errors = [Column(f"drive_error{k}_{u}", "float64", text.format(k), True) for u in ("rad", "mm") for k in more]
     drives = [drive.column for drive in robot.parts.drives]
-    told = [Column(name, "float64", f"nominal value {name}") for name in drives]
-    told += [Column(f"corrected_{name}", "float64", f"corrected value {name}") for name in drives]
-    added = {"gap_points": own, "corrected_drives": told}
+    values = [Column(name, "float64", f"nominal value {name}") for name in drives]
+    values += [Column(f"corrected_{name}", "float64", f"corrected value {name}") for name in drives]
+    added = {"gap_points": errors, "corrected_drives": values}
     return tuple(
         replace(table, columns=(*table.columns[:-1], *added.get(table.name, ()), table.columns[-1])) for table in TABLES
     )

@@ -1,4 +1,4 @@
-"""What a diagnosis is told: which effects may act, what is known of them, beliefs, seed."""
+"""Settings of a diagnosis: which effects may act, known values of their parameters, prior, seed."""
 
 from dataclasses import dataclass, field, replace
 from math import comb
@@ -10,19 +10,19 @@ from rrru.effects.library import HOLDS, NAMES, find
 from rrru.errors import ConfigError
 from rrru.robots.catalogue import MECHANISMS
 
-# in a configuration in place of the library's names
+# replaces the names of the library in a configuration
 ALL = "all"
 
 
 @dataclass(frozen=True)
 class Prior:
-    """Beliefs before the data: a mixture of robots with few effects and of robots as they are, with many small ones.
+    """Prior over sets of effects: a mixture of robots with few effects and of robots with many small ones.
 
-    counts: of robots with few, probabilities of zero, one, two and three effects; each effect more is as much rarer as
-    the third is after the second. each: of robots as they are, the probability that an effect acts, for each alike and
-    whatever else acts; share: of robots as they are. unexplained: probability of something unexplained besides.
-    tolerance: share of what a set explains up to which a remaining discrepancy still counts as the laws' own
-    inaccuracy.
+    counts: probabilities of zero, one, two and three effects where there are few; each further effect reduces the
+    probability by the ratio of the last two. each: probability that an effect acts where there are many, equal and
+    independent for all effects; share: of robots with many. unexplained: probability that something unexplained acts
+    in addition. tolerance: share of what a set explains up to which a remaining discrepancy still counts as inaccuracy
+    of the effect models.
     """
 
     counts: tuple = (0.3, 0.55, 0.13, 0.02)
@@ -48,7 +48,7 @@ class Prior:
 
 @dataclass(frozen=True)
 class GapSettings:
-    """effects: names or `module:object` of the laws that may act; known: effect to values of parameters that are known,
+    """effects: names or `module:object` of the effects that may act; known: effect to known values of its parameters,
     such as a gear ratio; prior; draws: resamplings for intervals; seed; use_near_singularity: fit points marked so.
     """
 
@@ -70,12 +70,12 @@ class GapSettings:
         return cls(effects, section["known"], prior, section["draws"], seed, use_near_singularity)
 
     def without(self, name):
-        """The settings with one effect taken out of the library, and those that hold it as a special case."""
+        """The settings with one effect taken out of the library, and without those that have it as a special case."""
         out = {name, *(general for general, held in HOLDS.items() if name in held)}
         return replace(self, effects=tuple(effect for effect in self.effects if effect not in out))
 
     def library(self, robot):
-        """Effects by name that a robot may have, what is known of them fixed.
+        """Effects by name that a robot may have, with known parameters fixed.
 
         Raises ConfigError for an unknown effect or parameter.
         """
@@ -95,24 +95,24 @@ class GapSettings:
         return {name: replace(one, coordinates=replace(one.coordinates, alike=alike)) for name, one in result.items()}
 
     def nuisance_sd(self, nuisance_sd):
-        """What the weight may be off by, by name: nothing where it is known."""
-        return {name: 0.0 if name in self.known.get(WEIGHT, {}) else doubt for name, doubt in nuisance_sd.items()}
+        """Standard deviations of the errors of payload and tilt by name, zero where they are known."""
+        return {name: 0.0 if name in self.known.get(WEIGHT, {}) else sd for name, sd in nuisance_sd.items()}
 
 
 def _check_weight(values):
-    """Raise ConfigError where not the numbers of the weight are known, or where they are not zero.
+    """Raise ConfigError for unknown names of payload and tilt, or for values that are not zero.
 
-    Leans about all axes are allowed: robots of one configuration may stand upright or hang on a wall.
+    Tilts about all axes are allowed: robots of one configuration may stand upright or hang on a wall.
     """
     allowed = ("extra_kg", *(f"lean_{axis}" for axis in "xyz"))
     if unknown := [name for name in values if name not in allowed]:
         raise ConfigError(f"gap.known: weight has no {unknown[0]!r}; allowed: {', '.join(allowed)}")
     if off := [name for name, value in values.items() if value]:
-        raise ConfigError(f"gap.known: weight.{off[0]} must be 0, as it was told; a mass is stated with the campaign")
+        raise ConfigError(f"gap.known: weight.{off[0]} is not 0; allowed: 0, as stated: state a mass with the campaign")
 
 
 def _with_known(effect, values):
-    """The effect with parameters of its shapes fixed to known values; raises ConfigError where no shape holds one."""
+    """The effect with parameters of its shapes fixed to known values; raises ConfigError for an unknown parameter."""
     coordinates = effect.coordinates
     unknown = [key for key in values if key not in coordinates.shapes[0]]
     if unknown:
@@ -120,9 +120,9 @@ def _with_known(effect, values):
         raise ConfigError(f"gap.known: {effect.name} has no known {unknown[0]!r}; allowed: {allowed}")
     fixed = dict.fromkeys(tuple((dict(shape) | dict(values)).items()) for shape in coordinates.shapes)
     shapes = tuple(map(dict, fixed))
-    # where all is known nothing is fitted further
-    doubt = 0.0 if set(values) == set(shapes[0]) else coordinates.doubt
-    return replace(effect, coordinates=replace(coordinates, shapes=shapes, searched=None, doubt=doubt))
+    # where all parameters are known none is fitted
+    shape_sd = 0.0 if set(values) == set(shapes[0]) else coordinates.doubt
+    return replace(effect, coordinates=replace(coordinates, shapes=shapes, searched=None, doubt=shape_sd))
 
 
 def check(config):

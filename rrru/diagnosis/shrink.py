@@ -106,7 +106,10 @@ def share_closed(before, after):
 
 
 def shrink_table(case, steps, resimulated_mm):
-    """Rows of `gap_shrink` without the campaign; resimulated_mm (m, 3): of the corrected sim, None without effects."""
+    """Rows of `gap_shrink` without the campaign.
+
+    resimulated_mm (m, 3): residuals of the corrected model, None without effects.
+    """
     trajectory = case.points["trajectory"].to_numpy()
     noise = float(np.sqrt(3.0) * case.noise_mm)
     rows = []
@@ -128,17 +131,18 @@ def shrink_table(case, steps, resimulated_mm):
 
 
 def model_row(shrink, kind, left_mm, noise_mm):
-    """A row of `gap_shrink` of a robot's file, given_model or corrected_model, beside the other rows.
+    """A row of `gap_shrink` of a robot's file, given_model or corrected_model, in addition to the other rows.
 
     left_mm (m, 3): measured minus the file's robot, NaN where it was not driven; noise_mm: per axis.
     """
     last, noise = shrink["step"].max(), float(np.sqrt(3.0) * noise_mm)
-    own = shrink[(shrink["step"] == (0 if kind == "given_model" else last)) & (shrink["kind"] == "held_out")].iloc[0]
+    step = 0 if kind == "given_model" else last
+    of_step = shrink[(shrink["step"] == step) & (shrink["kind"] == "held_out")].iloc[0]
     start = float(shrink.loc[(shrink["step"] == 0) & (shrink["trajectory"] == "*"), "gap_rms_mm"].iloc[0])
     left = left_mm[np.isfinite(left_mm).all(axis=1)]
     after = gap_rms((left**2).sum(axis=1) - noise**2)
     share = (np.nan if kind == "given_model" else _share(start, after)), np.nan, np.nan
-    label = {name: own[name] for name in ("step", "added", "effects")} | {"trajectory": "*", "kind": kind}
+    label = {name: of_step[name] for name in ("step", "added", "effects")} | {"trajectory": "*", "kind": kind}
     sizes = _sizes(left) | {"noise_rms_mm": noise, "gap_rms_mm": after}
     return label | sizes | dict(zip(CLOSED, share, strict=True))
 

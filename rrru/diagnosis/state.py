@@ -1,4 +1,4 @@
-"""A corrected sim, and the sim linearised about it. Lengths in mm, angles in rad."""
+"""A corrected model, and the model linearised about it. Lengths in mm, angles in rad."""
 
 from dataclasses import dataclass, field, replace
 
@@ -10,10 +10,10 @@ from rrru.effects.protocol import Contribution, gives_way, lacks_values
 
 @dataclass(frozen=True)
 class State:
-    """A corrected sim: deviations (p,) of the mechanism and, by effect and number of its shape, coordinates (c,).
+    """A corrected model: deviations (p,) of the mechanism and, by effect and number of its shape, coordinates (c,).
 
-    shape_values: effect to the values of its shape's parameters where they have been fitted further; "weight" to what
-    the weight is off by.
+    shape_values: effect to the values of its shape's parameters where they have been fitted; "weight" to the errors of
+    payload and tilt.
     """
 
     deviations: np.ndarray
@@ -22,18 +22,18 @@ class State:
 
     @property
     def weight(self):
-        """What weight is off by, by name, empty where that was not fitted, see `rrru.diagnosis.payload_nuisance`."""
+        """Errors of payload and tilt by name, empty where not fitted, see `rrru.diagnosis.payload_nuisance`."""
         return self.shape_values.get(WEIGHT, {})
 
     def under(self, weight):
-        """The state with another weight."""
+        """The state with other errors of payload and tilt."""
         return replace(self, shape_values=self.shape_values | {WEIGHT: weight})
 
     def shape(self, library, key):
         """Values of the shape's parameters of one effect (name, shape) by name."""
         name, number = key
         if key in self.effects and name in self.shape_values:
-            # one that was searched may not be among those that a library lists
+            # a shape that was searched may not be among those of a library
             return self.shape_values[name]
         return library[name].coordinates.shapes[number]
 
@@ -42,26 +42,26 @@ class State:
         coordinates = self.effects[key] if coordinates is None else coordinates
         effect = library[key[0]]
         values = effect.coordinates.to_values(coordinates, shape or self.shape(library, key))
-        borne = motion.under(*self.weight.values()) if self.weight and gives_way(effect) else motion
-        made = effect.contribute(borne, values)
+        loaded = motion.under(*self.weight.values()) if self.weight and gives_way(effect) else motion
+        made = effect.contribute(loaded, values)
         if not (getattr(effect, "needs", ()) and (lacking := lacks_values(effect, motion)).any()):
             return made
-        # what it changes there is unknown; `rrru.diagnosis.evidence` does not count these readings for it
+        # its change is unknown there; `rrru.diagnosis.evidence` does not count these readings for it
         return Contribution(np.where(lacking[:, None, None], 0.0, made.twists))
 
 
 @dataclass(frozen=True)
 class LinearizedProblem:
-    """The sim linearised about a state.
+    """The model linearised about a state.
 
-    data (m, 3): what was read minus model, with the state's effects taken out again; base (m, 3, p): derivative by the
+    data (m, 3): readings minus model, with the state's effects added back; base (m, 3, p): derivative by the
     mechanism's deviations; columns: (effect, shape) to the derivative (m, 3, c) by the effect's coordinates;
-    shape_columns: effect of the state to what its shape's parameters may be wrong by, (m, 3, q), each column one
+    shape_columns: effect of the state to the changes (m, 3, q) by its shape parameters, each column for one
     standard deviation; shape_steps: effect to these parameters, each (name, value, stepped value); drive (m, 3, K):
-    derivative by the actuator values; by_weight: (effect, shape) of what bears loads to what a step of each of q
-    numbers of the weight makes of its columns, (m, 3, q c); weight_steps: these numbers, each (name, value, stepped
-    value, prior mean of so many steps); base_prior: standard deviations (p,) and means (p,) of the geometric errors'
-    priors, the means as steps from where they stand, None for flat priors.
+    derivative by the actuator values; by_weight: (effect, shape) of compliant effects to the changes of their
+    columns, (m, 3, q c), by a step of each of q errors of payload and tilt; weight_steps: these, each (name, value,
+    stepped value, prior mean in steps); base_prior: standard deviations (p,) and means (p,) of the geometric errors'
+    priors, the means as steps from the present values, None for flat priors.
     """
 
     data: np.ndarray

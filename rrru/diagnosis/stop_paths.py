@@ -1,8 +1,8 @@
-"""What the drives do between stops, and from which side they come to each, where the campaign states that it stops.
+"""Paths of the drives between stops, and the side from which they come to each, for campaigns that stop to measure.
 
 Joint interpolation (PTP) moves every drive straight to its next value: it comes from the side of the value before. On a
 straight line of the tool (LIN) a drive may turn back on the way: it comes from the side of its last stretch. A drive
-that stands still between two stops keeps the side from which it came. Lengths in mm, angles in rad.
+that does not move between two stops keeps its side of arrival. Lengths in mm, angles in rad.
 """
 
 import numpy as np
@@ -12,16 +12,16 @@ from rrru.campaign.stated_motion import DRIVES, TOOL
 from rrru.effects.backlash import play
 from rrru.kinematics.inverse import inverse_kinematics
 
-# points of a way, closer to each other near its ends: what a drive turns back by just before a stop is its last stretch
+# points of a path, denser near its ends: a drive may turn back just before a stop
 _STEPS = 16
 _SHARES = 0.5 * (1.0 - np.cos(np.pi * np.arange(_STEPS + 1) / _STEPS))
-# senses of arrival that differ by less are the same: a long drive's value is rounded to some 1e-5 of what is no motion
+# senses of arrival that differ by less are the same: values of a long drive are rounded to some 1e-5 of its rest width
 _SAME = 0.01
 
 
 def paths_between_stops(mechanism, drive, position_mm, between):
-    """Actuator values (N, K) along everything that is driven, and their rows (s,) at the stops, one path for each way
-    that the robot may have taken: `between` as `rrru.campaign.stated_motion.StatedMotion` has it.
+    """Actuator values (N, K) along everything that is driven, one path for each way that the robot may have taken, and
+    their rows (s,) at the stops; `between` as `rrru.campaign.stated_motion.StatedMotion` has it.
 
     drive (s, K), position_mm (s, 3): of the stops.
     """
@@ -34,8 +34,8 @@ def paths_between_stops(mechanism, drive, position_mm, between):
 def undetermined_senses(paths, index, run, widths):
     """Stops (s, K) at which paths of `paths_between_stops` do not determine from which side a drive comes.
 
-    No path tells how the robot got to a run's start, run (s,), nor what it did where its way is unknown; two ways tell
-    nothing where they come from different sides. widths (K,): changes of drive values that are no motion.
+    No path determines how the robot got to a run's start, run (s,), nor its motion where its path is unknown. Two paths
+    determine nothing where they come from different sides. widths (K,): changes of drive values that are no motion.
     """
     senses = [_senses_of_arrival(path, index, run, widths) for path in paths]
     lost = [np.logical_or.reduceat(np.isnan(path), np.maximum(index - _STEPS + 1, 0)) for path in paths]
@@ -49,9 +49,9 @@ def _senses_of_arrival(path, index, run, widths):
     """
     result = np.zeros((len(index), path.shape[1]))
     for number in np.unique(run):
-        here = index[run == number]
-        piece = np.ascontiguousarray(path[here[0] : here[-1] + 1])
-        result[run == number] = play(piece, 0.5 * widths)[here - here[0]] / (-0.5 * widths)
+        stops = index[run == number]
+        piece = np.ascontiguousarray(path[stops[0] : stops[-1] + 1])
+        result[run == number] = play(piece, 0.5 * widths)[stops - stops[0]] / (-0.5 * widths)
     return result
 
 
@@ -63,7 +63,7 @@ def _straight_in_drives(_mechanism, drive, _position_mm):
 def _straight_in_tool(mechanism, drive, position_mm):
     """Actuator values (s - 1, steps + 1, K) on the ways between stops, on straight lines of the tool.
 
-    Its orientation turns about one axis. NaN where the nominal robot cannot be.
+    Its orientation turns about one axis. NaN where the nominal robot cannot reach.
     """
     straight = _straight_in_drives(mechanism, drive, position_mm)
     shape, poses = straight.shape, mechanism.solve(drive, position_mm)
@@ -78,7 +78,7 @@ def _straight_in_tool(mechanism, drive, position_mm):
         )
     else:
         found = mechanism.inverse(place.reshape(-1, 3)).reshape(shape)
-    # both ends are what the rows say, also of a controller that knows the robot's errors
+    # both ends agree with the rows, also for a controller that corrects the robot's errors
     found = found + (1.0 - _SHARES[:, None]) * (straight - found)[:, :1] + _SHARES[:, None] * (straight - found)[:, -1:]
     return found
 

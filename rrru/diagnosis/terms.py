@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-# on which legs a law acts: on each with its own value, on all with one value, or on one leg alone
+# on which legs an effect acts: on each with its own value, on all with one value, or on one leg alone
 EACH, SAME = "each", "same"
 
 
@@ -55,8 +55,8 @@ def variants(effect):
 
 def signatures(library, linear, terms):
     """Columns (n, 3, k) of each term's free numbers on a linearisation."""
-    own = ((linear.columns[term.effect, term.shape], term) for term in terms)
-    return [c if t.legs == EACH else c @ spread(library[t.effect].coordinates, t.legs) for c, t in own]
+    pairs = ((linear.columns[term.effect, term.shape], term) for term in terms)
+    return [c if t.legs == EACH else c @ spread(library[t.effect].coordinates, t.legs) for c, t in pairs]
 
 
 def sites(library, motion, term):

@@ -10,15 +10,15 @@ from rrru.diagnosis.problem import GEOMETRY
 def why_no_answer(inference, stated_mm=None):
     """Why no cause can be named, in words; empty where the fit of the best answer may be read.
 
-    A fit whose geometric errors end at their bounds has its minimum where no robot is, and one that leaves many times
-    the noise has a model of another robot, or readings of another campaign. stated_mm: noise per axis, None where
-    nobody states it.
+    A fit whose geometric errors end at their bounds has its minimum outside of all plausible robots. A fit with
+    residuals of many times the noise has a model of another robot, or readings of another campaign. stated_mm: noise
+    per axis, None where it is not stated.
     """
     return "; ".join(filter(None, (_at_bounds(inference), _far_off(inference, stated_mm))))
 
 
 def _at_bounds(inference):
-    """Which geometric errors bounds hold, in words; empty where none."""
+    """Which geometric errors end at bounds, in words; empty where none."""
     estimate, parameters = inference.fit.estimate, inference.case.mechanism.parameters
     held = np.flatnonzero(estimate.at_bound[estimate.parameters.places[GEOMETRY]])
     if not len(held):
@@ -28,7 +28,7 @@ def _at_bounds(inference):
         f"{parameters.names[k]} = {values[k]:.3g} {parameters.units[k]}" for k in held[: OPTIONS.max_listed_numbers]
     ]
     more = f" and {len(held) - len(shown)} more" if len(held) > len(shown) else ""
-    return f"the fit ends at bounds of the calibration's numbers ({', '.join(shown)}{more})"
+    return f"the fit ends at bounds of calibration parameters ({', '.join(shown)}{more})"
 
 
 def _far_off(inference, stated_mm):
@@ -40,4 +40,4 @@ def _far_off(inference, stated_mm):
     noise = float(np.sqrt(3.0) * axis_mm)
     if left <= OPTIONS.max_left_per_noise * noise:
         return ""
-    return f"the best answer leaves {left:.3g} mm rms, {left / noise:.0f} times the noise of {noise:.2g} mm"
+    return f"the residual of the best answer is {left:.3g} mm rms, {left / noise:.0f} times the noise of {noise:.2g} mm"

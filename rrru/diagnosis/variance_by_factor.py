@@ -1,4 +1,4 @@
-"""Where the gap lies: its variance by trajectory, region, direction, drive, sense of motion, speed, load and time."""
+"""Variance of the gap by factor: trajectory, region, direction, drive, sense of motion, speed, load and time."""
 
 from dataclasses import dataclass
 
@@ -20,7 +20,7 @@ _MORE_COLUMNS = ("drive_rms_rad", "drive_rms_mm", "x_mm", "y_mm", "z_mm")
 def variance_by_factor(case, residual_mm, drive, generator, draws=200):
     """Rows of `gap_locate` without the campaign.
 
-    residual_mm (m, 3): what was read minus calibrated sim; drive (m, 3, K): derivative by the actuator values. Shares
+    residual_mm (m, 3): readings minus calibrated model; drive (m, 3, K): derivative by the actuator values. Shares
     are of the mean square of positions on the robot, those of drives of all that was read, with the noise taken off;
     their 95 % intervals come from resampled runs (stretches where there are fewer than ten).
     """
@@ -35,8 +35,8 @@ def variance_by_factor(case, residual_mm, drive, generator, draws=200):
             if name == "region":
                 centre = case.motion.position_mm[case.at][chosen].mean(axis=0)
                 rows[-1] |= dict(zip(("x_mm", "y_mm", "z_mm"), centre.tolist(), strict=True))
-    one = case.on_robot.astype(float)
-    rows.extend(whole.row("direction", axis, components[:, k], one) for k, axis in enumerate("xyz"))
+    freedom = case.on_robot.astype(float)
+    rows.extend(whole.row("direction", axis, components[:, k], freedom) for k, axis in enumerate("xyz"))
     rows.extend(_drive_rows(case, residual_mm, drive, resampled))
     return pd.DataFrame(rows).reindex(columns=[*_COLUMNS, *_MORE_COLUMNS])
 
@@ -125,11 +125,11 @@ def _drive_rows(case, residual_mm, drive, resampled):
     residual_mm, drive = case.by_point(residual_mm), case.by_point(drive)
     errors, number = drive_errors(residual_mm, drive), np.flatnonzero(case.used)
     resampled = np.searchsorted(number, case.at[resampled])
-    # in units of each drive's own noise, so that poses of a large Jacobian do not drown the others
-    own = case.noise_mm**2 * (np.linalg.pinv(drive) ** 2).sum(axis=-1)
-    # a drive of another arm than the one that is read moves nothing, none what is fixed to the world
-    scaled = np.divide(errors**2, own, out=np.zeros_like(own), where=own > 0.0)
-    moving = (own > 0.0).astype(float)
+    # in units of each drive's own noise, so that poses of a large Jacobian do not dominate
+    noise = case.noise_mm**2 * (np.linalg.pinv(drive) ** 2).sum(axis=-1)
+    # a drive of another arm than the one that is read moves nothing; no drive moves a target fixed to the world
+    scaled = np.divide(errors**2, noise, out=np.zeros_like(noise), where=noise > 0.0)
+    moving = (noise > 0.0).astype(float)
     whole, rows = _Whole(scaled.sum(axis=1), moving.sum(axis=1), 1.0, resampled), []
     names = drive_words(case.mechanism).all_names
     for k, (name, unit) in enumerate(zip(names, case.mechanism.parts.units, strict=True)):

@@ -1,13 +1,13 @@
 """The decision of a diagnosis: which causes are named, which are confounded, and which leg is at fault.
 
-A decision is not a probability. A cause is named where it acts with a probability of at least
-`OPTIONS.min_named_probability`: naming a cause that does not act then costs as much as missing this many
+A decision is not a probability. A cause is named where its posterior probability is at least
+`OPTIONS.min_named_probability` = p: naming a cause that does not act then costs as much as missing
 
     p / (1 - p)
 
-that do. Causes none of which is that probable, but one of which acts with that probability, form a group; they exclude
-each other, since each explains what the others would. The most probable one of a group stands for it wherever a model
-is needed.
+causes that do. Confounded causes form a group where none is that probable alone, but one of them acts with that
+probability. They exclude each other, since each explains what the others would. The most probable one represents the
+group wherever a model is needed.
 """
 
 from dataclasses import dataclass
@@ -30,8 +30,8 @@ class Group:
 
 @dataclass(frozen=True)
 class Verdict:
-    """effects: names in order of share, () for none, of a group the most probable one; unexplained: something is left
-    that no effect explains; probability: that exactly these act; leg: the one that is at fault, from 1 on, else 0;
+    """effects: names in order of share, () for none, of a group the most probable one; unexplained: no effect
+    explains a part; probability: that exactly these act; leg: the one that is at fault, from 1 on, else 0;
     possible: what may act and has no name, "unexplained" and "none" among it, the most probable first; rivals: other
     answers that the data leave open, each (names, unexplained, probability); groups: of confounded causes; no_answer:
     why the fit allows none, else empty; sure: probability of the least sure of the decisions on single causes.
@@ -85,46 +85,46 @@ def label(effects, unexplained):
     return "+".join((*effects, *(("unexplained",) if unexplained else ()))) or "none"
 
 
-def decide(beliefs, library, small=frozenset()):
+def decide(posterior, library, small=frozenset()):
     """Verdict of a Posterior; library: the effects that may be named, by name; small: those that are not, see below.
 
     Nothing is named as long as "none" has a probability of 0.2: a false alarm costs more than a gap too small to
-    matter. Where something acts and no cause is probable enough, the most probable answer with a cause stands, and its
-    causes are called possible. Something is unexplained where that is more probable than not; an effect that makes a
-    small part of the gap may then be a part of that.
+    matter. Where something acts and no cause is probable enough, the most probable answer with a cause is given, and
+    its causes are called possible. Something is unexplained where that is more probable than not; an effect that makes
+    a small part of the gap may then be a part of that.
     """
-    sets, unknown = beliefs.sets(), beliefs.probability_unexplained
+    sets, unknown = posterior.sets(), posterior.probability_unexplained
     none = sets.get(_NONE, 0.0)
-    each = {name: beliefs.marginal(name) for name in library}
-    order = sorted(each, key=lambda name: (-each[name], name))
+    marginal = {name: posterior.marginal(name) for name in library}
+    order = sorted(marginal, key=lambda name: (-marginal[name], name))
     groups = ()
     if none > OPTIONS.max_none_probability:
         effects, unexplained = (), False
     else:
         unexplained = unknown > OPTIONS.min_unexplained_probability
         order = [name for name in order if not (unexplained and name in small)]
-        effects = tuple(name for name in order if each[name] >= OPTIONS.min_named_probability)
-        groups = _groups(beliefs, [name for name in order if name not in effects], each)
+        effects = tuple(name for name in order if marginal[name] >= OPTIONS.min_named_probability)
+        groups = _groups(posterior, [name for name in order if name not in effects], marginal)
         effects += tuple(group.names[0] for group in groups)
         if not (effects or unexplained):
             # something acts, and no cause is probable enough: the most probable answer that has one
             answers = {key: p for key, p in sets.items() if key != _NONE}
             best = max(answers, key=answers.get)
             effects, unexplained = tuple(sorted(best[0])), best[1]
-    named = {name for name in effects if each[name] >= OPTIONS.min_named_probability}
+    named = {name for name in effects if marginal[name] >= OPTIONS.min_named_probability}
     chosen = frozenset(effects), unexplained
     # with something unexplained more effects may act, as a part of that
     answers = {key for key in sets if key == chosen or (unexplained and key[1] and key[0] >= chosen[0])}
     probability = sum(p for key, p in sets.items() if key in answers)
     grouped = {name for group in groups for name in group.names}
     firsts = {group.names[0] for group in groups}
-    open_ones = {name: p for name, p in each.items() if name not in named | firsts}
+    open_ones = {name: p for name, p in marginal.items() if name not in named | firsts}
     open_ones |= {"none": none, "unexplained": unknown}
     taken = {"unexplained"} if unexplained else set() if effects else {"none"}
     least = OPTIONS.min_possible_probability
     # one cause of a group is as sure as it is among its rivals
     decisions = [
-        p if name in effects else 1.0 - p for name, p in each.items() if name in effects or name not in grouped
+        p if name in effects else 1.0 - p for name, p in marginal.items() if name in effects or name not in grouped
     ]
     decisions += [1.0 - open_ones[name] for name in ("none", "unexplained") if name not in taken]
     possible = sorted((-p, name) for name, p in open_ones.items() if p > least and name not in taken)
@@ -133,7 +133,7 @@ def decide(beliefs, library, small=frozenset()):
         effects,
         unexplained,
         float(min(probability, 1.0)),
-        _leg(beliefs, effects, library),
+        _leg(posterior, effects, library),
         tuple(name for _, name in possible),
         tuple(rival for rival in rivals if rival[2] > OPTIONS.min_rival_probability_ratio * probability),
         groups,
@@ -141,21 +141,22 @@ def decide(beliefs, library, small=frozenset()):
     )
 
 
-def _groups(beliefs, names, each):
+def _groups(posterior, names, marginal):
     """Groups among names that are not named, the most probable first: those that exclude each other.
 
-    each: probability of each name.
+    marginal: probability of each name.
     """
-    left, found = [name for name in names if each[name] > OPTIONS.min_possible_probability], []
+    left, found = [name for name in names if marginal[name] > OPTIONS.min_possible_probability], []
     while left:
         members = [left[0]]
         for name in left[1:]:
-            if len(members) < OPTIONS.max_group_size and all(_exclude(beliefs, each, name, one) for one in members):
+            excluded = all(_exclude(posterior, marginal, name, member) for member in members)
+            if len(members) < OPTIONS.max_group_size and excluded:
                 members.append(name)
         # as few as make it sure
-        while len(members) > 2 and beliefs.any_of(members[:-1]) >= OPTIONS.min_sure_probability:
+        while len(members) > 2 and posterior.any_of(members[:-1]) >= OPTIONS.min_sure_probability:
             members.pop()
-        together = beliefs.any_of(members)
+        together = posterior.any_of(members)
         if len(members) > 1 and together >= OPTIONS.min_named_probability:
             found.append(Group(tuple(members), float(together)))
             left = [name for name in left if name not in members]
@@ -164,14 +165,14 @@ def _groups(beliefs, names, each):
     return tuple(found)
 
 
-def _exclude(beliefs, each, first, second):
-    """Whether two causes act together much less often than if they had nothing to do with each other."""
-    return beliefs.both(first, second) < OPTIONS.max_joint_probability_ratio * each[first] * each[second]
+def _exclude(posterior, marginal, first, second):
+    """Whether two causes act together much less often than if they were independent."""
+    return posterior.both(first, second) < OPTIONS.max_joint_probability_ratio * marginal[first] * marginal[second]
 
 
-def _leg(beliefs, effects, library):
+def _leg(posterior, effects, library):
     """The one leg that all effects with legs of their own name, 0 where there is none."""
-    likely = [beliefs.legs(name) for name in effects if per_leg(library[name])]
+    likely = [posterior.legs(name) for name in effects if per_leg(library[name])]
     best = {max(legs, key=legs.get) for legs in likely if legs}
     leg = best.pop() if len(best) == 1 else 0
     return leg if isinstance(leg, int) else 0

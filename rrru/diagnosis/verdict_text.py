@@ -1,6 +1,6 @@
 """The answer of a diagnosis for people and for scripts: sentences in plain words, and the same facts as `verdict.json`.
 
-`workflow/schemas/verdict.schema.yaml` says what stands in it. mm, rad; sizes are root mean squares of 3-D distances.
+`workflow/schemas/verdict.schema.yaml` is its schema. mm, rad; sizes are root mean squares of 3-D distances.
 """
 
 import numpy as np
@@ -26,7 +26,7 @@ _CHECK = (
     "Next: check units, signs and order of the drives, frame and places of targets, and whether the file is of this "
     "robot: make check-data FILE=... names what reconciles them."
 )
-# first words of what no file holds where none was written
+# first words of the column not_in_model where no file was written
 NOT_CORRECTED = "not corrected: "
 _WORDS = DriveWords()
 # units of sentences for those of tables, and the factor: without rows of zeros
@@ -73,7 +73,7 @@ def answer(campaign, verdict, tables, drives=_WORDS):
 
 
 def _corrected_file(verdict):
-    """What the robot's corrected file is worth; None where the robot has no file."""
+    """Residual errors of the robot's corrected file; None where the robot has no file."""
     known = np.isfinite(verdict["file_error_mm"])
     if not (known or verdict["not_in_model"]):
         return None
@@ -86,7 +86,7 @@ def _corrected_file(verdict):
 
 
 def sentences(facts):
-    """What the facts say, the headline first, for somebody who knows the robot and no statistics."""
+    """What the facts say, the headline first, for readers who know the robot and no statistics."""
     if facts["no_answer"]:
         return [_no_answer(facts), _CHECK]
     file = facts["corrected_file"] or {"headline": ""}
@@ -127,7 +127,7 @@ def probability(value):
 
 
 def percent(share):
-    """A share in per cent; what effects that imitate each other have too much is left out."""
+    """A share in per cent, limited to 0 to 100: shares of confounded effects may be beyond."""
     return f"{100.0 * min(max(share, 0.0), 1.0):.0f} %"
 
 
@@ -158,14 +158,14 @@ def _effect(name, tables, budget, drives):
     legs = cause["legs"] if isinstance(cause["legs"], str) else ""
     numbers = tables["gap_parameters"].query("effect == @name").to_dict("records")
     places = tables["gap_drive_functions"].query("effect == @name and worst")
-    one = (int(legs),) if legs.isdigit() else ()
+    leg = (int(legs),) if legs.isdigit() else ()
     return {
         "name": name,
-        **vars(cause_texts(name, drives, one)),
+        **vars(cause_texts(name, drives, leg)),
         "probability": _clipped(cause["probability"]),
         "decision": cause["decision"],
         "legs": legs,
-        "place": drives.place(*one) if one else "",
+        "place": drives.place(*leg) if leg else "",
         **{key: share.get(key) for key in ("rms_mm", "share", "share_low", "share_high")},
         "parameters": [_row(number, _NUMBER) for number in numbers],
         "worst_places": [_row(place, _WORST) for place in places.to_dict("records")],
@@ -173,7 +173,7 @@ def _effect(name, tables, budget, drives):
 
 
 def _group(names, tables, budget):
-    """Facts of causes that cannot be told apart."""
+    """Facts of a group of confounded causes."""
     causes = tables["gap_attribute"].set_index("effect").loc[names]
     shares = {part["part"]: part["share"] for part in budget if part["kind"] == "effect"}
     return {
@@ -191,25 +191,25 @@ def _no_answer(facts):
 
 
 def _missed(facts):
-    """How far off the calibrated robot is at points that its calibration has not seen."""
+    """Residual error of the calibrated robot at points that its calibration has not used."""
     gap, noise = (rounded(facts[name]) for name in ("gap_rms_mm", "noise_rms_mm"))
     if facts["effects"] or facts["unexplained"]:
-        return f"After calibration the robot still misses by {gap} mm at points left out of it (noise taken out)."
+        return f"After calibration the residual error is {gap} mm at points left out of it (noise subtracted)."
     sure = probability(facts["probability"])
     return (
-        f"After calibration nothing systematic is left that these data could show (probability {sure}): "
-        f"the robot misses by {gap} mm, the measuring noise is {noise} mm."
+        f"After calibration these data show no systematic error (probability {sure}): "
+        f"the residual error is {gap} mm, the measuring noise is {noise} mm."
     )
 
 
 def _causes(facts):
-    """What makes the gap, and how sure that is."""
-    with_shares = _shares_told(facts)
+    """The causes of the gap with their shares and probabilities."""
+    with_shares = _shares_are_determined(facts)
     groups = {group["names"][0]: group for group in facts["groups"]}
     single = [effect for effect in facts["effects"] if effect["name"] not in groups]
     small = [effect["name"] for effect in single if with_shares and _is_small(effect, facts)]
     if len(small) == len(facts["effects"]):
-        # of causes that are all small none is more worth a sentence than the others
+        # where all causes are small each has a sentence
         small = []
     said = [_by_share(facts, groups, len(small))] if with_shares and len(facts["effects"]) > 1 else []
     said = ([_UNSURE] if any(effect["decision"] == POSSIBLE for effect in single) else []) + said
@@ -276,38 +276,38 @@ def _by_share(facts, groups, small):
 
 
 def _of_group(group, with_shares):
-    """Causes of which one acts, and which these data cannot tell apart."""
+    """Confounded causes of which one acts."""
     names = [readable(name) for name in group["names"]]
-    each = ", ".join(f"{name} {probability(p)}" for name, p in zip(names, group["probabilities"], strict=True))
+    listed = ", ".join(f"{name} {probability(p)}" for name, p in zip(names, group["probabilities"], strict=True))
     share = f"; together they make {small_percent(group['share'])} of the gap" if with_shares else ""
     return (
-        f"One of these acts, and these data cannot tell which: {each} (probability that one does: "
+        f"One of these acts, and these data cannot tell which: {listed} (probability that one does: "
         f"{probability(group['probability'])}){share}. The corrected model has {names[0]}."
     )
 
 
 def _sure(facts, groups):
     """How probable each cause is, and the answer as a whole."""
-    each = [one for one in facts["effects"] if one["name"] not in groups]
+    single = [effect for effect in facts["effects"] if effect["name"] not in groups]
     exactly = probability(facts["probability"])
-    if not each:
+    if not single:
         return [f"Probability of this answer: {exactly}."]
-    listed = ", ".join(f"{readable(one['name'])} {probability(one['probability'])}" for one in each)
+    listed = ", ".join(f"{readable(one['name'])} {probability(one['probability'])}" for one in single)
     return [f"Probability that it acts: {listed}. Probability of exactly this answer: {exactly}."]
 
 
-def _shares_told(facts):
-    """Whether parts of the gap are shares of it, and not, beside the noise, larger than the whole."""
+def _shares_are_determined(facts):
+    """Whether the parts of the gap are shares of it, and not larger than the whole because of the noise."""
     shares = [effect["share"] or 0.0 for effect in facts["effects"]]
     shares.append(sum(part["share"] for part in _scatter_parts(facts)))
     return facts["gap_rms_mm"] > 0.0 and max(shares) <= OPTIONS.max_mentioned_share
 
 
-def _cause(effect, follow, told):
-    """One effect: its share, or its size where shares are not told, name, leg, sizes and meaning."""
+def _cause(effect, follow, with_shares):
+    """One effect: its share, or its size where shares are not determined, name, leg, sizes and meaning."""
     share = "Also there is"
     if effect["share"] is not None:
-        share = f"{share_with_interval(effect, follow)} is" if told else f"{rounded(effect['rms_mm'])} mm is"
+        share = f"{share_with_interval(effect, follow)} is" if with_shares else f"{rounded(effect['rms_mm'])} mm is"
     place = f" {effect['place']}" if effect["place"] else ""
     sizes = _sizes(effect["parameters"])
     listed = ", ".join(sizes) if len(sizes) <= OPTIONS.max_listed_numbers else f"{len(sizes)} numbers"
@@ -317,44 +317,44 @@ def _cause(effect, follow, told):
 
 
 def _worst(places):
-    """Where the drive errs most of those whose errors have the unit of the largest; empty without places."""
+    """Where the drive error is largest, of drives with the unit of the first place; empty without places."""
     if not places:
         return ""
-    one = max(places, key=lambda place: (place["unit"] == places[0]["unit"], abs(place["error"])))
-    turning = one["unit"] == "rad"
-    at = f"{np.degrees(one['drive_value']):.1f} degrees" if turning else f"{one['drive_value']:.1f} mm"
-    size = with_interval(one["error"], one["low_95"], one["high_95"], one["unit"])
-    return f" It is largest for {one['name']} at {at}: {size} off its mean over the measured range."
+    worst = max(places, key=lambda place: (place["unit"] == places[0]["unit"], abs(place["error"])))
+    turning = worst["unit"] == "rad"
+    at = f"{np.degrees(worst['drive_value']):.1f} degrees" if turning else f"{worst['drive_value']:.1f} mm"
+    size = with_interval(worst["error"], worst["low_95"], worst["high_95"], worst["unit"])
+    return f" It is largest for {worst['name']} at {at}: {size} off its mean over the measured range."
 
 
 def _sizes(parameters):
-    """Numbers that were fitted with their 95 % intervals, those that are one number under several names once."""
+    """Fitted values with their 95 % intervals; parameters with the same value have one entry."""
     by_size = {}
-    for one in parameters:
-        if np.isfinite(one["standard_error"] or np.nan):
-            unit, factor = _READABLE.get(one["unit"], (one["unit"], 1.0))
-            size = with_interval(*(factor * one[key] for key in ("value", "low_95", "high_95")), unit)
-            by_size.setdefault(size, []).append(one["parameter"])
+    for row in parameters:
+        if np.isfinite(row["standard_error"] or np.nan):
+            unit, factor = _READABLE.get(row["unit"], (row["unit"], 1.0))
+            size = with_interval(*(factor * row[key] for key in ("value", "low_95", "high_95")), unit)
+            by_size.setdefault(size, []).append(row["parameter"])
     return [f"{' = '.join(names)} = {size}" for size, names in by_size.items()]
 
 
 def _scatter(facts):
-    """What does not repeat, where it acts and matters."""
+    """The share that does not repeat, where it acts and matters."""
     parts = _scatter_parts(facts, OPTIONS.min_scatter_probability)
     share = sum(part["share"] for part in parts)
     if share < OPTIONS.min_mentioned_share:
         return []
     unknown = REPEATABILITY_UNKNOWN in facts["notes"]
-    if not _shares_told(facts):
+    if not _shares_are_determined(facts):
         if unknown:
             return [f"Some of it is {_RANDOM}"]
-        return ["Some of it does not repeat from pass to pass: no model can take that away."]
-    # of a sum the interval is not known
+        return ["Some of it does not repeat from pass to pass: no model can correct it."]
+    # the interval of a sum is not known
     acting = [part for part in parts if part["share"]]
     size = share_with_interval(acting[0]) if len(acting) == 1 else percent(share)
     if unknown:
         return [f"{size} is {_RANDOM}"]
-    return [f"{size} does not repeat from pass to pass: no model can take that away."]
+    return [f"{size} does not repeat from pass to pass: no model can correct it."]
 
 
 def _scatter_parts(facts, least=0.0):
@@ -364,23 +364,23 @@ def _scatter_parts(facts, least=0.0):
 
 
 def _left(facts):
-    """What is left once the effects are in the simulator."""
+    """Residual error with the effects in the simulator."""
     after, noise = (rounded(facts[name]) for name in ("gap_after_rms_mm", "noise_rms_mm"))
     what = "it" if len(facts["effects"]) == 1 else "them"
-    return [f"Add {what} to the simulator and {after} mm is left on runs it has not seen; the noise is {noise} mm."]
+    return [f"With {what} in the simulator the residual error on left-out runs is {after} mm; the noise is {noise} mm."]
 
 
 def _open(facts):
-    """What else it could be: the rivals that are named, and what the runs that are advised would decide."""
+    """What else may act: the named rivals, and what the advised runs would decide."""
     named = [effect["name"] for effect in facts["effects"]]
     contests = [_apart(run["separates"]) for run in facts["next"]]
     asked = dict.fromkeys(name for sides in contests for name in sorted(set().union(*sides)))
-    # of groups there is a sentence
+    # groups have a sentence of their own
     grouped = [name for group in facts["groups"] for name in group["names"]]
     others = dict.fromkeys(name for name in [*facts["confusable_with"], *asked] if name not in [*named, *grouped])
     listed = [_OUTSIDE.get(name, readable(name)) for name in others]
-    doubted = {name for sides in contests if not all(sides) for name in set().union(*sides)}
-    listed += [f"that {readable(name)} does not act" for name in named if name in doubted]
+    uncertain = {name for sides in contests if not all(sides) for name in set().union(*sides)}
+    listed += [f"that {readable(name)} does not act" for name in named if name in uncertain]
     if not listed:
         return []
     first = "Parts of it could be" if facts["unexplained"] else "These data cannot rule out"
@@ -405,7 +405,7 @@ def _next(facts):
     if said:
         return said
     if facts["unexplained"]:
-        return ["Next: no run is advised, since the library has nothing to test; see where the gap lies."]
+        return ["Next: no run is advised, since no effect model fits; gap_locate says where the gap is largest."]
     decided = not (facts["groups"] or facts["confusable_with"])
     least = min((effect["probability"] for effect in facts["effects"]), default=facts["probability"])
     if max(least if decided else 0.0, facts["probability"]) >= OPTIONS.min_sure_probability:
@@ -442,7 +442,7 @@ def _initial(text):
 
 
 def _contest(separates):
-    """In what two answers "a+b / a+c" differ, in words."""
+    """The difference between two answers "a+b / a+c", in words."""
     sides = [" + ".join(map(readable, sorted(side))) for side in _apart(separates)]
     return f"between {sides[0]} and {sides[1]}" if all(sides) else f"whether {''.join(sides)} acts"
 

@@ -67,18 +67,18 @@ class Whitened:
         made = [np.zeros((ends[-1], 0))]
         for name, shape in linear.columns:
             if per_leg(self.library[name]):
-                own, sums = numbers[name, shape, EACH], spread(self.library[name].coordinates, SAME)
+                of_legs, sums = numbers[name, shape, EACH], spread(self.library[name].coordinates, SAME)
                 numbers[name, shape, SAME] = ends[-1] + sum(part.shape[1] for part in made) + np.arange(sums.shape[1])
                 made.append(np.zeros((ends[-1], sums.shape[1])))
-                made[-1][own] = sums
+                made[-1][of_legs] = sums
         return numbers, np.concatenate(made, axis=1)
 
     @cached_property
     def _together(self):
         """Columns of calibration and effects, and the data, (m, 3, k), by the runs' cosines; waves (m,)."""
         linear = self.linear
-        beside = *linear.shape_columns.values(), *linear.by_weight.values()
-        blocks = linear.base, *linear.columns.values(), *beside, linear.data[..., None]
+        nuisance = *linear.shape_columns.values(), *linear.by_weight.values()
+        blocks = linear.base, *linear.columns.values(), *nuisance, linear.data[..., None]
         return along_runs(np.concatenate(blocks, axis=-1), self.run)
 
     @cached_property

@@ -9,7 +9,7 @@ from rrru.figures import choose, style
 
 _GROUPS = ("all_lines",)
 _NOT_SHOWN = ("all",)
-# more columns than this do not fit beside each other
+# more columns than this do not fit side by side
 _SIDE_BY_SIDE = 9
 
 
@@ -29,17 +29,17 @@ def cross(tables, options):
     shown = pd.concat([before, after]).drop_duplicates(["calibration", "trajectory"], keep="last")
     tables = (shown.pivot(index="calibration", columns="trajectory", values=size) for size in ("mean_mm", "max_mm"))
     both = [table.reindex(rows)[columns].to_numpy(dtype=float) for table in tables]
-    beside = len(columns) <= _SIDE_BY_SIDE
+    side_by_side = len(columns) <= _SIDE_BY_SIDE
     height = 8.0 * len(rows) + 22.0
-    figure = style.new(style.DOUBLE_MM, height + 22.0 if beside else 2.0 * height + 14.0)
-    panels = figure.subplots(*((1, 2) if beside else (2, 1)), sharey=beside)
+    figure = style.new(style.DOUBLE_MM, height + 22.0 if side_by_side else 2.0 * height + 14.0)
+    panels = figure.subplots(*((1, 2) if side_by_side else (2, 1)), sharey=side_by_side)
     scale = _scale(np.concatenate(both))
     meaning = "residual of the calibrated model" if mode == "model" else "error when driven again"
     for mark, word, axes, matrix in zip("ab", ("mean", "largest"), panels, both, strict=True):
         image = _panel(axes, matrix, scale, rows, columns)
         axes.set_title(f"({mark}) {word} {meaning} (mm)")
         axes.set_xlabel("applied to")
-    for axes in panels[: 1 if beside else 2]:
+    for axes in panels[: 1 if side_by_side else 2]:
         axes.set_ylabel("calibrated on")
     bar = figure.colorbar(image, ax=list(panels), location="bottom", aspect=60, fraction=0.05)
     bar.set_label("position error (mm)")

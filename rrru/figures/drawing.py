@@ -10,8 +10,8 @@ from rrru.store import tables
 def draw_all(figures, paths, options, outputs):
     """Draw figures {name: ("module:function", names of its tables)} to outputs["{name}_{kind}"] of `style.KINDS`.
 
-    paths: the tables' paths by name; options: what all figures are told, see their functions. What a figure's function
-    says of it is the caption in all files.
+    paths: the tables' paths by name; options: of all figures, see their functions. The docstring of a figure's function
+    is its caption in all files.
     """
     for name, (place, needed) in figures.items():
         module, _, infer = place.partition(":")

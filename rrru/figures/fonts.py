@@ -1,7 +1,7 @@
 """Fonts embedded in a PDF without their layout tables.
 
-A PDF holds text that is laid out already: nobody reads the tables of kerning and ligatures in it, and cutting them down
-to the glyphs in use takes longer than the glyphs themselves.
+A PDF holds text that is laid out already: its tables of kerning and ligatures are not used, and a subset of them takes
+longer than the glyphs themselves.
 """
 
 from fontTools.ttLib import registerCustomTableClass
@@ -14,11 +14,11 @@ class UnusedTable(BaseTTXConverter):
     """A layout table that a subset of its font goes without."""
 
     def prune_pre_subset(self, _font, _options):
-        """What fontTools asks of a table before it cuts it down: whether to keep it."""
+        """Whether fontTools keeps the table in a subset: never."""
         return False
 
 
 def leave_out_layout():
-    """Tell fontTools, in this process, that subsets of fonts have no layout tables."""
+    """Make fontTools, in this process, leave layout tables out of subsets of fonts."""
     for tag in _LAYOUT_TABLES:
         registerCustomTableClass(tag, __name__, UnusedTable.__name__)

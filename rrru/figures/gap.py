@@ -1,4 +1,4 @@
-"""The diagnosis of one campaign's gap on one page: where it lies, what causes it, and how far it shrinks."""
+"""The diagnosis of one campaign's gap on one page: where it is largest, what causes it, and how far it shrinks."""
 
 import re
 from textwrap import wrap
@@ -13,7 +13,7 @@ from rrru.figures import choose, gap_arrows, gap_budget, style
 _BEFORE = {"color": "#777777", "marker": "o", "markerfacecolor": "white"}
 _AFTER = {"color": style.BLUE, "marker": "s"}
 _NOISE = style.TOLERANCE
-# rows that stand below the library's effects
+# rows below the library's effects
 _APART = ("none", "unexplained")
 _NOTHING = {"none": "nothing to add", "unexplained": "nothing in the library to add"}
 # characters in a line of the headline, its height, and the height of a row of bars
@@ -28,20 +28,19 @@ _NAMED_FROM, _INSIDE_FROM = 0.05, 0.6
 # more runs than this have no room for their trajectories' names, and for all their numbers
 _NAMED_RUNS, _NUMBERED_RUNS = 9, 30
 _KINDS = {"held_out": "held-out", "resimulated": "resimulated"}
-# stands for a space at which no line may end
+# replaces a space at which no line may end
 _JOINT = "\N{NO-BREAK SPACE}"
 
 
 @style.printed
 def gap(tables, options):
-    """The gap between the calibrated sim and the measurement. On top its budget: the share of its mean square that
+    """The gap between the calibrated model and the measurement. On top its budget: the share of its mean square that
     each effect makes, that does not repeat, and that nothing explains, with 95 % intervals as thin lines; covariances
     of confounded parts (hatched) and the sampling of the noise (dotted) complete them to 1. The probability in the
-    headline is that of exactly these causes, of a group alone that one of it acts. (a) Where:
-    measured minus calibrated sim at the points from above and from the side, magnified as stated. (b) Why: probability
-    of every effect, those of the verdict in colour, those of a group hatched. (c) Remaining gap: on runs
-    that were not fitted on, under the calibrated and the corrected sim, with the share closed. (d) Residual of every
-    point.
+    headline is that of exactly these causes, of a group alone that one of it acts. (a) Where: measured minus
+    calibrated model at the points from above and from the side, magnified as stated. (b) Why: probability of every
+    effect, those of the verdict in colour, those of a group hatched. (c) Remaining gap: on runs that were not fitted
+    on, under the calibrated and the corrected model, with the share closed. (d) Residual of every point.
     """
     campaign, frames = options["campaign"], {}
     for name in ("gap_verdicts", "gap_attribute", "gap_shrink", "gap_budget"):
@@ -63,7 +62,7 @@ def gap(tables, options):
 
 @style.printed
 def gap_map(tables, options):
-    """Where the robot misses: measured minus calibrated sim at the points, from above and from the side. An arrow
+    """Residual errors: measured minus calibrated model at the points, from above and from the side. An arrow
     points to where the robot really was, magnified as stated; dark is far. The ring is where the mean over neighbouring
     points is largest.
     """
@@ -88,7 +87,7 @@ def _map(figure, panels, used, verdict, z_down, mark=""):
     panels["top view"].set_title(f"{mark}gap, magnified {factor:g} times; ring: worst region")
     place = {"location": "bottom", "aspect": 40, "fraction": 0.08, "extend": "max" if beyond else "neither"}
     bar = figure.colorbar(arrows, ax=panels["side view"], ticks=MaxNLocator(_TICKS), **place)
-    bar.set_label("measured minus calibrated sim (mm)")
+    bar.set_label("measured minus calibrated model (mm)")
 
 
 def _sized(points, campaign):
@@ -105,7 +104,7 @@ def _page(lines, causes, trajectories, used):
     """A figure that is as high as its panels need, and these by name, empty."""
     rows = [_ROW_MM * causes, _ROW_MM * trajectories]
     views = [_MAP_MM * gap_arrows.height_ratio(used, name) for name in gap_arrows.VIEWS]
-    # what stands around the panels takes part in the figure's height, not in their ratios
+    # labels around the panels count in the figure's height, not in the ratios of the panels
     middle, others = max(sum(rows) + 30.0, sum(views) + 36.0), (_LINE_MM * lines, _BUDGET_MM, 46.0, 4.0)
     heights = [*others[:2], min(middle, _MOST_MM - sum(others)), others[2]]
     figure = style.new(style.DOUBLE_MM, sum(heights) + others[3])
@@ -120,7 +119,7 @@ def _page(lines, causes, trajectories, used):
 
 
 def _headline(verdict, causes, words):
-    """Lines of the verdict itself, and of what is to be known and done about it."""
+    """Lines of the verdict itself, and of its facts and the next step."""
     groups = {names.split(" | ")[0]: names.replace(" | ", " or ") for names in verdict["groups"].split("; ")}
     name = _named("+".join(groups.get(one, one) for one in verdict["effects"].split("+")))
     name += f", {_leg(str(verdict['leg']), **words)}" if verdict["leg"] else ""
@@ -194,7 +193,7 @@ def _causes(axes, causes, verdict, words):
 
 
 def _shrink(axes, shrink, verdict):
-    """Gap of every trajectory before and after, beside the noise, with the share closed as a number."""
+    """Gap of every trajectory before and after, and the noise, with the share closed as a number."""
     kind = next(name for name in _KINDS if (shrink["kind"] == name).any())
     rows = shrink[shrink["kind"] == kind]
     first, last = (rows[rows["step"] == step].set_index("trajectory") for step in (0, rows["step"].max()))
@@ -247,9 +246,9 @@ def _along(axes, points, verdict):
 
 def _legend(corrected, left_out):
     """What marks and lines of the lower panels are."""
-    handles = [Line2D([], [], linestyle="-", label="calibrated sim", **_BEFORE)]
+    handles = [Line2D([], [], linestyle="-", label="calibrated model", **_BEFORE)]
     if corrected:
-        handles.append(Line2D([], [], linestyle="-", label="corrected sim, held out", **_AFTER))
+        handles.append(Line2D([], [], linestyle="-", label="corrected model, held out", **_AFTER))
     handles.append(Line2D([], [], label="noise, rms", **_NOISE))
     if left_out:
         handles.append(Line2D([], [], color=style.BLACK, marker="x", linestyle="none", label="left out"))

@@ -1,4 +1,4 @@
-"""Which combinations of parameters each set of trajectories sees, and how well."""
+"""Observability: which combinations of parameters each set of trajectories determines, and how well."""
 
 from textwrap import fill
 
@@ -19,9 +19,9 @@ _ROOM_FOR = 9
 
 @style.printed
 def observability(tables, options):
-    """What every set of trajectories can see: directions of parameter space from the best seen to the worst, what
-    each is made of (weights below 0.15, or of more than nine parameters, are not written), the half width of
-    the 95 % interval along it, and its singular value.
+    """Observability by every set of trajectories: directions of parameter space from the best seen to the worst. Each
+    has its weights (those below 0.15, or of more than nine parameters, are not written), the half width of the 95 %
+    interval along it, and its singular value.
     """
     rows = choose.of_campaign(tables, "observability", options["campaign"], "observability")
     rows = rows.assign(half_mm=_QUANTILE_95 * rows["standard_error_mm"])
@@ -61,16 +61,16 @@ def _weights(axes, part):
 
 
 def _errors(axes, part, limits):
-    """Half width of the 95 % interval along each direction on a log axis, the singular value as a number beside it."""
-    each = part.drop_duplicates("direction").set_index("direction").sort_index()
-    rows = np.arange(len(each))
-    seen = each["half_mm"].notna().to_numpy()
-    axes.hlines(rows[seen], limits[0], each["half_mm"][seen], color=style.BLUE, linewidth=1.0)
-    axes.plot(each["half_mm"], rows, "o", color=style.BLUE)
+    """Half width of the 95 % interval along each direction on a log axis, the singular value as a number next to it."""
+    directions = part.drop_duplicates("direction").set_index("direction").sort_index()
+    rows = np.arange(len(directions))
+    seen = directions["half_mm"].notna().to_numpy()
+    axes.hlines(rows[seen], limits[0], directions["half_mm"][seen], color=style.BLUE, linewidth=1.0)
+    axes.plot(directions["half_mm"], rows, "o", color=style.BLUE)
     for row in rows[~seen]:
         axes.text(0.5, row, "not seen", transform=axes.get_yaxis_transform(), ha="center", va="center", fontsize=7.0)
-    axes.set(xscale="log", xlim=limits, ylim=(len(each) - 0.5, -0.5))
-    axes.set_yticks(rows, [_short(value) for value in each["singular_value"]])
+    axes.set(xscale="log", xlim=limits, ylim=(len(directions) - 0.5, -0.5))
+    axes.set_yticks(rows, [_short(value) for value in directions["singular_value"]])
     axes.yaxis.tick_right()
     axes.xaxis.set_major_locator(LogLocator(numticks=4))
     style.plain_log(axes.xaxis)

@@ -1,7 +1,7 @@
 """Print style of every figure: sizes in mm, colours, labels, and saving with bytes that depend on the data only.
 
-Colours are Okabe and Ito's, told apart by every kind of colour vision; those that meet in one panel also differ in grey
-and in marker.
+Colours are Okabe and Ito's, which every kind of colour vision can distinguish; those that meet in one panel also differ
+in grey and in marker.
 """
 
 from contextlib import contextmanager

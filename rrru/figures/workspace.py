@@ -27,7 +27,7 @@ def workspace(tables, options):
     """
     campaign = options["campaign"]
     grid_rows = choose.of_campaign(tables, "workspace", campaign, "workspace")
-    own = choose.of_campaign(tables, "campaigns", campaign, "workspace").iloc[0]
+    facts = choose.of_campaign(tables, "campaigns", campaign, "workspace").iloc[0]
     slices = [name for name in _SLICES if (grid_rows["slice"] == name).any()]
     if not slices:
         raise ConfigError(f"workspace: campaign {campaign!r} has none of the slices {', '.join(_SLICES)}")
@@ -44,7 +44,7 @@ def workspace(tables, options):
             axes.set_title(f"({next(marks)}) {meaning}, {grid.place}")
             axes.set_xlabel(f"{grid.across} (mm)")
         if grid.up == "z":
-            style.height_axis(row[0], bool(own["z_down"]))
+            style.height_axis(row[0], bool(facts["z_down"]))
         else:
             row[0].set_ylabel(f"{grid.up} (mm)")
     place = {"location": "bottom", "aspect": 60, "fraction": 0.03, "spacing": "uniform"}

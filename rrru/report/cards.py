@@ -1,4 +1,4 @@
-"""The answers on the first screen: one card per campaign, from its `verdict.json` and what is told of the campaign."""
+"""The answers on the first screen: one card per campaign, from its `verdict.json` and the facts of the campaign."""
 
 from dataclasses import dataclass
 
@@ -50,9 +50,9 @@ class Advice:
 
 @dataclass(frozen=True)
 class Card:
-    """One campaign's answer: what it is of, the answer in a line, sizes in mm as text, the lead sentence, the others,
-    Advice on each cause, what is next, notes, links to corrected files of the robot, what they are worth, and parts and
-    steps of the bars.
+    """One campaign's answer: its source, the answer in a line, sizes in mm as text, the lead sentence, the others,
+    Advice on each cause, the next step, notes, links to corrected files of the robot, their errors, and parts and steps
+    of the bars.
     """
 
     campaign: str
@@ -99,7 +99,7 @@ def card(facts, source="", found=None, models=()):
 
 
 def _short(facts):
-    """The answer in a line: causes with their shares, how sure, and what is next."""
+    """The answer in a line: causes with their shares, the probability, and the next run."""
     named = [(readable(effect["name"]), effect["share"]) for effect in facts["effects"]]
     if facts["no_answer"]:
         return f"No cause is named: {facts['no_answer']}."
@@ -130,7 +130,7 @@ def _not_corrected(facts):
 
 
 def _file_worth(facts):
-    """Sentences on how good the corrected file is, which stand beside its link."""
+    """Sentences on the errors of the corrected file, which are next to its link."""
     if why := _not_corrected(facts):
         return [f"Your robot's file was {why}."]
     if not (file := facts.get("corrected_file")):
@@ -161,7 +161,7 @@ def _parts(budget):
 
 
 def _steps(facts):
-    """The gap at left-out points before and after the effects are added, beside the noise."""
+    """The gap at left-out points before and after the effects are added, and the noise."""
     rows = [("calibrated", facts["gap_rms_mm"], "before")]
     if facts["effects"]:
         rows.append(("with the effects too", facts["gap_after_rms_mm"], "after"))

@@ -1,4 +1,4 @@
-"""Two calibrated campaigns of one kind of robot: whether their fitted numbers differ beyond their errors. mm, rad."""
+"""Two calibrated campaigns of one kind of robot: whether their parameters differ beyond their errors. mm, rad."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,7 +14,7 @@ from rrru.estimation.intervals import QUANTILE_95
 from rrru.store import json_files, tables
 
 METHOD = "least_squares"
-# numbers of the instrument's frame
+# first letters of parameters of the instrument's frame
 _FRAME = "world_"
 _READ = ("measurements", "parameters", "correlations", "calibrations", "gap_points")
 
@@ -37,9 +37,7 @@ class Side:
 
 @dataclass(frozen=True)
 class Difference:
-    """Differences of fitted numbers: a row per parameter, their chi-square, its degrees of freedom, and how probable
-    chance makes as much.
-    """
+    """Differences of fitted parameters: a row per parameter, their chi-square, its degrees of freedom and p-value."""
 
     rows: pd.DataFrame
     chi_square: float
@@ -51,18 +49,18 @@ def read(folder, campaign, name):
     """The Side of a campaign in a folder of results; raises ConfigError where it is not there or is not calibrated."""
     folder = Path(folder)
     if not folder.is_dir():
-        raise ConfigError(f"compare: there is no folder {folder}")
+        raise ConfigError(f"compare: there is no folder {folder}; allowed: a folder of results")
     place = folder / "campaigns" / campaign
     known = calibrated(folder)
     if campaign not in known:
         raise ConfigError(
             f"compare: {folder} has no calibrated campaign {campaign!r}; it has {', '.join(known) or 'none'}"
         )
-    missing = [one for one in _READ if not (place / f"{one}.parquet").is_file()]
+    missing = [table for table in _READ if not (place / f"{table}.parquet").is_file()]
     if missing or not (place / "verdict.json").is_file():
         wanted = ", ".join([*missing, "verdict.json"][:3])
         raise ConfigError(f"compare: {place} lacks {wanted}; run `snakemake` for it first")
-    frames = {one: tables.read(place / f"{one}.parquet") for one in _READ}
+    frames = {table: tables.read(place / f"{table}.parquet") for table in _READ}
     return Side(name, campaign, json_files.read(place / "robot.json"), frames, json_files.read(place / "verdict.json"))
 
 
@@ -87,11 +85,11 @@ def widest(first, second):
 
 def _listed(sides, names):
     """Names of both sides for a message."""
-    return " and ".join(f"{side.name}: {', '.join(own)}" for side, own in zip(sides, names, strict=True))
+    return " and ".join(f"{side.name}: {', '.join(listed)}" for side, listed in zip(sides, names, strict=True))
 
 
 def check(first, second):
-    """Raise ConfigError where the numbers of two sides mean different things."""
+    """Raise ConfigError where the parameters of two sides are not comparable."""
     one, other = first.told["nominal"], second.told["nominal"]
     if one["name"] != other["name"]:
         raise ConfigError(f"compare: {first.name} is of a robot {one['name']}, {second.name} of {other['name']}")
@@ -99,11 +97,13 @@ def check(first, second):
         values = [nominal["dimensions"].get(key) for nominal in (one, other)]
         if values[0] != values[1]:
             what = f"{first.name} has {key} {values[0]}, {second.name} {values[1]}"
-            raise ConfigError(f"compare: the nominal robots differ: {what}; deviations count from these")
+            raise ConfigError(
+                f"compare: the nominal robots differ: {what}; allowed: the same dimensions, from which deviations count"
+            )
     read = _read_in(first), _read_in(second)
     if read[0] != read[1]:
         what = f"of {first.name} {read[0]}, of {second.name} {read[1]}"
-        raise ConfigError(f"compare: other things were read: {what}; allowed: campaigns with the same readings")
+        raise ConfigError(f"compare: the readings differ: {what}; allowed: campaigns with the same readings")
 
 
 def _read_in(side):
@@ -126,33 +126,33 @@ def difference(first, second, calibration):
     square = float(step[known] @ np.linalg.solve(covariance, step[known])) if known.any() else 0.0
     frame = pd.DataFrame({"parameter": values[0].index, "unit": values[0]["unit"].to_numpy()})
     numbers = (("a", values[0]["value"], error[0]), ("b", values[1]["value"], error[1]), ("difference", step, together))
-    for name, value, own in numbers:
+    for name, value, sd in numbers:
         frame[name] = np.asarray(value)
-        frame[f"{name}_low"], frame[f"{name}_high"] = (frame[name] + sign * QUANTILE_95 * own for sign in (-1, 1))
+        frame[f"{name}_low"], frame[f"{name}_high"] = (frame[name] + sign * QUANTILE_95 * sd for sign in (-1, 1))
     freedom = int(known.sum())
     return Difference(frame, square, freedom, float(chi2.sf(square, freedom)) if freedom else 1.0)
 
 
 def _other_numbers(sides, names):
-    """Why two sides whose numbers have other names cannot be compared."""
-    own = [sorted(names[k] - names[1 - k]) for k in range(2)]
-    if all(name.startswith(_FRAME) for name in own[0] + own[1]):
-        with_frame = sides[0] if own[0] else sides[1]
-        without = sides[1] if own[0] else sides[0]
+    """Why two sides with different parameters cannot be compared."""
+    only = [sorted(names[k] - names[1 - k]) for k in range(2)]
+    if all(name.startswith(_FRAME) for name in only[0] + only[1]):
+        with_frame = sides[0] if only[0] else sides[1]
+        without = sides[1] if only[0] else sides[0]
         return (
-            f"of {with_frame.name} the instrument's frame is calibrated, too ({', '.join(own[0] + own[1])}), "
+            f"of {with_frame.name} the instrument's frame is calibrated, too ({', '.join(only[0] + only[1])}), "
             f"of {without.name} it is not; give both campaigns the same `frame`: robot or register"
         )
-    lists = _listed(sides, (one or ["nothing more"] for one in own))
-    return f"calibrated with different numbers; {lists}"
+    lists = _listed(sides, (names_of or ["nothing more"] for names_of in only))
+    return f"calibrated with different parameters; {lists}"
 
 
 def _estimate(side, calibration):
     """Values of a calibration by parameter, and their covariance, NaN for what has no standard error."""
-    own = side.frames["parameters"].query("calibration == @calibration and method == @METHOD").set_index("parameter")
+    values = side.frames["parameters"].query("calibration == @calibration and method == @METHOD").set_index("parameter")
     pairs = side.frames["correlations"].query("calibration == @calibration")
-    matrix = pd.DataFrame(np.eye(len(own)), index=own.index, columns=own.index)
+    matrix = pd.DataFrame(np.eye(len(values)), index=values.index, columns=values.index)
     for first, second, value in pairs[["parameter_a", "parameter_b", "correlation"]].itertuples(index=False):
         matrix.loc[first, second] = matrix.loc[second, first] = value
-    error = own["standard_error"].where(own["seen"] & ~own["at_bound"]).to_numpy()
-    return own, matrix.to_numpy() * np.outer(error, error)
+    error = values["standard_error"].where(values["seen"] & ~values["at_bound"]).to_numpy()
+    return values, matrix.to_numpy() * np.outer(error, error)

@@ -42,7 +42,7 @@ def _parts(side):
 
 
 def _square(side):
-    """Mean square of the gap, noise taken out, and its standard error over the runs."""
+    """Mean square of the gap, noise subtracted, and its standard error over the runs."""
     points = side.frames["gap_points"].query("used")
     size = (points[[f"before_{axis}_mm" for axis in "xyz"]] ** 2).sum(axis=1)
     mean, error = over_runs(size, points["run"])

@@ -22,7 +22,7 @@ _LEVEL = 0.01
 
 @dataclass(frozen=True)
 class Chapter:
-    """What the page says of one pair of campaigns: key, title, sentences, what points were used, tables."""
+    """Part of the page on one pair of campaigns: key, title, sentences, which points were used, tables."""
 
     key: str
     title: str
@@ -69,7 +69,7 @@ def _place(text):
 
 
 def _chapter(first, second):
-    """What there is to say of two campaigns."""
+    """The Chapter on two campaigns."""
     names = [campaign for _, campaign in (first, second)]
     if names[0] == names[1]:
         names = [f"{campaign} in {folder}" for folder, campaign in (first, second)]
@@ -80,7 +80,7 @@ def _chapter(first, second):
     judged, shared = unseen(one, other, calibration), same_points(one, other)
     sentences = [_numbers(found, shared), *_gap(one, other, gap), *_better((one, other), judged)]
     key = "-".join(dict.fromkeys(campaign for _, campaign in (first, second)))
-    shown = [("Fitted numbers", found.rows), ("What the miss is made of, with 95 % intervals", gap.rows)]
+    shown = [("Fitted parameters", found.rows), ("Budget of the gap, with 95 % intervals", gap.rows)]
     if judged:
         rows = pd.concat([place.rows for place in judged], ignore_index=True)
         shown.append(("Errors at points that neither has seen", rows))
@@ -88,38 +88,38 @@ def _chapter(first, second):
         cells.grid(frame, f"{key}-{number}", title, heads=_heads(frame, names))
         for number, (title, frame) in enumerate(shown, start=1)
     ]
-    return Chapter(key, f"{names[0]} beside {names[1]}", sentences, _points(judged, calibration, shared), grids)
+    return Chapter(key, f"{names[0]} compared with {names[1]}", sentences, _points(judged, calibration, shared), grids)
 
 
 def _numbers(found, shared):
-    """Whether the fitted numbers differ."""
+    """Whether the fitted parameters differ."""
     known = found.rows.dropna()
     if known.empty:
-        return "The fitted numbers cannot be compared: none has a 95 % interval on both sides."
+        return "The fitted parameters cannot be compared: none has a 95 % interval on both sides."
     width = known["difference_high"] - known["difference_low"]
     largest = known.loc[(known["difference"].abs() / width).idxmax()]
-    square = f"chi-square {cells.short(found.chi_square)} with {found.freedom} numbers"
+    square = f"chi-square {cells.short(found.chi_square)} with {found.freedom} degrees of freedom"
     measure = f"{square}, by chance with probability {_chance(found.chance)}"
     ends = [cells.short(largest[f"difference_{end}"]) for end in ("low", "high")]
     size = f"{cells.short(largest['difference'])} {largest['unit']} (95 %: {ends[0]} to {ends[1]})"
     most = f"most {largest['parameter']}, by {size}"
     said = "differ by more than their errors" if found.chance < _LEVEL else "do not differ beyond their errors"
-    beside = f" Both share {shared} measured points, so that the true chi-square is no smaller." if shared else ""
-    return f"The fitted numbers {said} ({measure}; {most}).{beside}"
+    common = f" Both share {shared} measured points, so that the true chi-square is no smaller." if shared else ""
+    return f"The fitted parameters {said} ({measure}; {most}).{common}"
 
 
 def _gap(one, other, gap):
-    """What each side leaves, and whether that differs."""
+    """Residual error of each side, and whether it differs."""
     for side in (one, other):
         facts = side.verdict
         names = [effect["name"] for effect in facts["effects"]] + ["unexplained"] * facts["unexplained"]
         gap_mm = rounded(facts["gap_rms_mm"])
         if why := facts.get("no_answer"):
-            yield f"{side.name} misses by {gap_mm} mm after calibration, and no cause is named: {why}."
+            yield f"{side.name} has a residual error of {gap_mm} mm after calibration, and no cause is named: {why}."
             continue
         causes = readable("+".join(names)) or "nothing to add"
         sure = probability(facts["probability"])
-        yield f"{side.name} misses by {gap_mm} mm after calibration: {causes} (probability {sure})."
+        yield f"{side.name} has a residual error of {gap_mm} mm after calibration: {causes} (probability {sure})."
     differs = list(gap.rows.loc[gap.rows["differs"], "part"])
     said = "differ" if gap.chance < _LEVEL else "do not differ beyond chance"
     parts = f" Parts that differ: {', '.join(map(readable, differs))}." if differs else ""
@@ -127,14 +127,14 @@ def _gap(one, other, gap):
 
 
 def _better(sides, judged):
-    """Which side foretells better, campaign by campaign, and what follows."""
+    """Which side predicts better, campaign by campaign, and which one to trust."""
     winners = []
     for place in judged:
         sizes = f"{rounded(place.rms_mm[0])} mm against {rounded(place.rms_mm[1])} mm"
         where = f"On {place.points} points of {place.campaign} that neither has seen"
         clear = place.chance < _LEVEL
         winners.append((sides[0] if place.gain_mm2 > 0.0 else sides[1]) if clear else None)
-        said = f"{winners[-1].name} is better" if clear else "they are equally good, but for chance"
+        said = f"{winners[-1].name} is better" if clear else "they do not differ beyond chance"
         yield f"{where} {said}: {sizes} (by chance with probability {_chance(place.chance)})."
     yield f"Which to trust: {_trusted(sides, winners)}"
 
@@ -145,7 +145,7 @@ def _trusted(sides, winners):
     if not winners:
         return "cannot be said, there are no points that neither has seen."
     if not distinct:
-        return "either; these points do not tell them apart."
+        return "either; these points do not separate them."
     if len(distinct) == 1:
         return f"{distinct.pop()}."
     if winners == list(sides):
@@ -158,18 +158,18 @@ def _points(judged, calibration, shared):
     listed = " and ".join(f"{place.points} of {place.campaign}" for place in judged) or "none"
     same = " Points that both have measured are left out of both fits." if shared else ""
     return (
-        f"The points: {listed}, of the set {calibration!r}. Each is foretold by the other campaign's calibration, "
-        "which has not seen it, and by its own campaign's, fitted again without the trajectory, run or stretch of it."
+        f"The points: {listed}, of the set {calibration!r}. Each is predicted by the other campaign's calibration, "
+        "which has not used it, and by its own campaign's, fitted again without its trajectory, run or stretch."
         f"{same} Chance is counted over the runs. Intervals hold if the model lacks nothing: where effects are "
-        "named, fitted numbers may differ for these."
+        "named, fitted parameters may differ for these."
     )
 
 
 def _heads(frame, names):
     """Words of the columns of both sides: their names for a and b."""
-    own = {"a": names[0], "b": names[1]}
-    sides = [name for name in frame if name.partition("_")[0] in own]
-    return {name: f"{own[name[0]]} {cells.words(name[2:])}".strip() for name in sides}
+    name_of = {"a": names[0], "b": names[1]}
+    sides = [name for name in frame if name.partition("_")[0] in name_of]
+    return {name: f"{name_of[name[0]]} {cells.words(name[2:])}".strip() for name in sides}
 
 
 def _chance(value):

@@ -1,4 +1,4 @@
-"""Which of two calibrations foretells better, at points that neither has seen. Errors in mm."""
+"""Which of two calibrations predicts better, at points that neither has used. Errors in mm."""
 
 from dataclasses import dataclass
 
@@ -26,7 +26,7 @@ class Unseen:
     """Errors at points of one campaign that neither side has seen.
 
     rows: per trajectory; points: how many; rms_mm (2,): of both sides; gain_mm2: mean squared error of the second less
-    that of the first; chance: how probable chance over the runs makes as much.
+    that of the first; chance: p-value of the gain, over the runs.
     """
 
     campaign: str
@@ -43,13 +43,13 @@ def same_points(first, second):
 
 
 def unseen(first, second, calibration):
-    """The Unseen of each campaign that has points which neither side has seen.
+    """The Unseen of each campaign that has points which neither side has used.
 
-    A point is foretold by the other campaign's calibration, which has not seen it, and by its own, fitted again without
-    the trajectory that it lies on (the run or the stretch where there are few of them). What both have measured is left
-    out of both.
+    A point is predicted by the other campaign's calibration, which has not used it. It is also predicted by its own,
+    fitted again without the trajectory of the point (the run or the stretch where there are few of them). Points that
+    both have measured are left out of both.
     """
-    found = [(place, _foretold(place, (first, second), calibration)) for place in _places(first, second)]
+    found = [(place, _prediction_errors(place, (first, second), calibration)) for place in _places(first, second)]
     return [_compared(place.campaign, frame) for place, frame in found if len(frame)]
 
 
@@ -69,7 +69,7 @@ def _compared(campaign, frame):
 
 
 def _drawn(run):
-    """What chance draws of points in runs (n,): the runs, or stretches of points where there are few of them."""
+    """Units of resampling of points in runs (n,): the runs, or stretches of points where there are few of them."""
     if run.nunique() >= _FOLDS:
         return run
     count = min(_STRETCHES, len(run) // _LEAST_STRETCH)
@@ -77,7 +77,7 @@ def _drawn(run):
 
 
 def over_runs(values, runs):
-    """Mean of values (n,) and its standard error, runs taken as what chance draws; 0 where there is one run."""
+    """Mean of values (n,) and its standard error, with runs as independent units; 0 where there is one run."""
     by_run = values.groupby(runs).agg(["mean", "size"])
     mean, weight, count = values.mean(), by_run["size"] / len(values), len(by_run)
     square = (weight**2 * (by_run["mean"] - mean) ** 2).sum() * count / max(count - 1, 1)
@@ -85,12 +85,12 @@ def over_runs(values, runs):
 
 
 def _places(first, second):
-    """Sides whose points are asked for: one where both were measured together."""
+    """Sides whose points are predicted: one where both were measured together."""
     together = same_points(first, second) == len(first.frames["measurements"]) == len(second.frames["measurements"])
     return (first,) if together else (first, second)
 
 
-def _foretold(place, sides, calibration):
+def _prediction_errors(place, sides, calibration):
     """Errors (mm) of both sides, a and b, at the points of one of them, with their trajectory and run."""
     measurements = place.frames["measurements"].reset_index(drop=True)
     usable = rows.usable(measurements, place.settings.use_near_singularity)
@@ -108,15 +108,15 @@ def _foretold(place, sides, calibration):
 
 
 def _without(side, fold, calibration):
-    """A side's robot and its deviations from all of its points but those of a fold."""
-    own = side.frames["measurements"]
-    robot = setup.measured_robot(side.told["nominal"], own)
-    seen = _rows_of(own, fold)
+    """A side's robot and its deviations from all of its points except those of a fold."""
+    measurements = side.frames["measurements"]
+    robot = setup.measured_robot(side.told["nominal"], measurements)
+    seen = _rows_of(measurements, fold)
     if not seen.any():
         return robot, deviation_vector(side.frames["parameters"], calibration, METHOD, robot)
     arm_mm = side.told["arm_mm"] or np.nan
-    rest = rows.hold_out(own, seen)
-    residuals = select(rest, robot, side.settings.sets[calibration], side.settings.use_near_singularity, arm_mm)
+    remaining = rows.hold_out(measurements, seen)
+    residuals = select(remaining, robot, side.settings.sets[calibration], side.settings.use_near_singularity, arm_mm)
     if residuals is None:
         raise FitError(f"{side.name}: too few points are left")
     fit = calibrate(residuals, side.told["noise_mm"], side.settings.loss, side.settings.loss_scale_mm)
@@ -130,7 +130,7 @@ def _rows_of(measurements, others):
 
 
 def _folds(measurements):
-    """What points are left out together: their trajectory, their run, or a stretch."""
+    """Groups of points that are left out together: their trajectory, their run, or a stretch."""
     for name in ("trajectory", "run"):
         if measurements[name].nunique() >= _FOLDS:
             return measurements[name].to_numpy()

@@ -1,4 +1,4 @@
-"""What stands on the page, section by section: figures and tables by name. What a run has not made is left out."""
+"""Contents of the page, section by section: figures and tables by name. Results that do not exist are left out."""
 
 from dataclasses import dataclass
 
@@ -19,8 +19,8 @@ class Shown:
 class Section:
     """A section: its key, title and introduction, names of figures with their titles, and tables.
 
-    own: figures of every campaign, which lie in a folder of its name, with their titles, and the table that has to have
-    rows of the campaign, empty where none has to; those of the reproduced one lie beside the study's.
+    own: figures of every campaign, in a folder of its name, with their titles, and the table that has to have rows of
+    the campaign, empty where none has to; those of the reproduced one are next to the study's.
     """
 
     key: str
@@ -37,8 +37,8 @@ SECTIONS = (
     Section(
         "diagnosis",
         "Behind the answers",
-        "How each answer came about. The gap is what the calibrated simulator still gets wrong, with the measuring "
-        "noise taken out. Probabilities are meant literally: of answers with 0.9, nine in ten should be right.",
+        "How each answer was found. The gap is the residual error of the calibrated simulator, with the measuring "
+        "noise subtracted. Posterior probabilities are calibrated: of answers with 0.9, nine in ten should be right.",
         own=(
             ("gap", "The whole diagnosis", ""),
             ("drive_functions", "Errors of the drives over their values", "gap_drive_functions"),
@@ -50,26 +50,26 @@ SECTIONS = (
             Shown("gap_shrink", "How far the gap shrinks", rows="trajectory == '*'"),
             Shown(
                 "gap_parameters",
-                "Numbers for the simulator, calibration and effects fitted together",
+                "Parameters for the simulator, calibration and effects fitted together",
                 "campaign effect parameter unit value low_95 high_95 at_bound",
             ),
             Shown(
                 "gap_drive_functions",
-                "Where each drive errs most",
+                "Where each drive error is largest",
                 "campaign effect name unit drive_value error low_95 high_95",
                 "worst",
             ),
-            Shown("gap_locate", "Where the gap lies"),
-            Shown("gap_identifiability", "What these data could show at all"),
-            Shown("gap_next_runs", "Runs that would tell more"),
-            Shown("gap_next_poses", "Poses that would tell more"),
+            Shown("gap_locate", "Variance of the gap by factor"),
+            Shown("gap_identifiability", "Detectable effects in these data"),
+            Shown("gap_next_runs", "Most informative next runs"),
+            Shown("gap_next_poses", "Most informative next poses"),
         ),
     ),
     Section(
         "calibration",
-        "Calibration: which numbers may be trusted",
-        "Each number with its 95 % interval: the truth lies within in 95 of 100 cases, if the model lacks nothing. "
-        "Where the diagnosis has found effects, numbers that change by more with them are biased.",
+        "Calibration: which parameters may be trusted",
+        "Each parameter with its 95 % interval: it holds the truth in 95 of 100 cases, if the model is complete. "
+        "Where the diagnosis has found effects, parameters that change by more with them are biased.",
         own=(
             ("observability", "What the measured points see", ""),
             ("workspace", "Where the points lie", ""),
@@ -82,8 +82,8 @@ SECTIONS = (
                 "campaign calibration method points mean_mm rms_mm max_mm noise_mm noise_from rank condition "
                 "parameters_at_bound",
             ),
-            Shown("genetic_against_least_squares", "The genetic algorithm beside least squares"),
-            Shown("gauge", "Numbers that these poses do not tell apart"),
+            Shown("genetic_against_least_squares", "The genetic algorithm compared with least squares"),
+            Shown("gauge", "Parameters that are not separately identifiable at these poses"),
             Shown("registration", "The instrument's frame in the robot's, as registered"),
             Shown("campaigns", "Campaigns: where they came from, and what was noted"),
         ),
@@ -106,7 +106,7 @@ SECTIONS = (
     Section(
         "reproduction",
         "What the reproduction shows",
-        "The published study of the 3-RRRU robot beside this one, on a virtual robot.",
+        "The published study of the 3-RRRU robot compared with this one, on a virtual robot.",
         figures=(
             ("fig09", "Group 1 before and after (Fig. 9)"),
             ("fig10", "Lines after calibration (Fig. 10)"),
@@ -116,7 +116,7 @@ SECTIONS = (
             ("fig07", "Migration fraction (Fig. 7)"),
         ),
         tables=(
-            Shown("published", "Published numbers beside these"),
+            Shown("published", "Published numbers compared with these"),
             Shown("redraw_counts", "How often they are met over other draws of chance"),
             Shown("twin_numbers", "Numbers that were searched for the virtual robot"),
             Shown("sweep_effect", "Do the algorithm's settings matter?"),
@@ -132,7 +132,7 @@ SECTIONS = (
     Section(
         "ptt",
         "Sister study: 3-PTT, Jacobian and RBF network",
-        "Five experiments with play and load; the benefit counts on points that the network has not seen.",
+        "Five experiments with backlash and load; the benefit counts on points that the network has not seen.",
         figures=(
             ("ptt_benefit", "Benefit per axis and experiment"),
             ("ptt_extrapolation", "Benefit off the curve"),
@@ -141,13 +141,13 @@ SECTIONS = (
             ("ptt_network", "What the network learns"),
             ("ptt_training", "Training"),
             ("ptt_corrections", "Corrections of the sliders"),
-            ("ptt_backlash", "Play of the screws"),
+            ("ptt_backlash", "Backlash of the screws"),
             ("ptt_singularity", "Singularities"),
         ),
         tables=(
             Shown("ptt_benefit", "Benefit", rows="set == 'test'"),
-            Shown("ptt_backlash", "Play"),
-            Shown("ptt_repeatability", "Scatter of the sliders"),
+            Shown("ptt_backlash", "Backlash"),
+            Shown("ptt_repeatability", "Non-repeatability of the sliders"),
         ),
     ),
     Section(
@@ -156,7 +156,7 @@ SECTIONS = (
         "Three zero offsets found by a camera on the platform that sees dots on a plane.",
         figures=(
             ("delta_errors", "Errors on the plane before and after"),
-            ("delta_observability", "What images can tell"),
+            ("delta_observability", "Observability from images"),
             ("delta_images", "What the camera sees"),
         ),
         tables=(
@@ -174,7 +174,7 @@ SECTIONS = (
     Section(
         "printers",
         "Real printers",
-        "Linear deltas from what their owners measured, beside the answer saved with them.",
+        "Linear deltas from measurements of their owners, compared with the answer saved with them.",
         figures=(("printers", "Every printer"),),
         tables=(
             Shown(
@@ -211,7 +211,7 @@ SECTIONS = (
     Section(
         "real",
         "Measured series of real robots",
-        "Robots that others measured; rows that were left out say how well the model foretells.",
+        "Robots that others measured; rows that were left out show how well the model predicts.",
         own=(("steps", "Step by step", ""), ("spectrum", "Waves of every joint", ""), ("lengths", "Lengths", "")),
         tables=(
             Shown("real_verdicts", "Answers"),

@@ -1,4 +1,4 @@
-"""The report: one HTML file that needs nothing else, from what lies in a folder of results."""
+"""The report: one self-contained HTML file of a folder of results."""
 
 import base64
 import html
@@ -19,7 +19,7 @@ from rrru.studies import glossary
 TEMPLATES = Path(__file__).parent / "templates"
 # a figure that is larger than this as SVG is shown as its PNG
 _LARGEST_SVG = 400_000
-# words of columns that hold numbers of legs or, of robots without, of drives
+# heads of columns that hold numbers of legs or, for robots without legs, of drives
 _HEADS = {"legs": "leg or drive"}
 _TRUST = ("parameters", "correlations", "calibrations", "gap_parameters", "gap_verdicts")
 
@@ -37,7 +37,7 @@ class Picture:
 
 @dataclass(frozen=True)
 class Part:
-    """A section with what there is for it."""
+    """A section with its pictures and tables."""
 
     key: str
     title: str
@@ -50,8 +50,8 @@ class Part:
 class Results:
     """What a run has written to a folder.
 
-    reproduced: the campaign whose figures lie beside the study's; campaign: the one whose own parts are read, None for
-    the whole study's; glyphs: what all figures that were asked for draw their text with.
+    reproduced: the campaign whose figures are next to the study's; campaign: the one whose parts are read, None for the
+    whole study; glyphs: shared glyphs of the figures that were asked for.
     """
 
     folder: Path
@@ -83,7 +83,7 @@ class Results:
         return sorted(names, key=lambda name: (not sources.get(name, "").startswith("file"), name))
 
     def owners(self):
-        """Whose figures belong here: what lies beside them may be of an earlier run."""
+        """Names whose figures belong to this run: other figures in the folder may be of an earlier run."""
         frame = self.frame("real_verdicts")
         return {self.reproduced, *self.campaigns(), *(() if frame is None else frame["dataset"])}
 
@@ -94,17 +94,17 @@ class Results:
 
     def worth(self, name, noise_rms_mm):
         """The Worth of a campaign's calibration, None where the tables of it were not made."""
-        errors, told = self.frame("errors"), self.frame("campaigns")
+        errors, campaigns = self.frame("errors"), self.frame("campaigns")
         place = self.folder / "campaigns" / name / "gap_points.parquet"
-        if errors is None or told is None or not place.is_file():
+        if errors is None or campaigns is None or not place.is_file():
             return None
-        registered = told.set_index("campaign")["registration_rms_mm"].notna().get(name, False)
+        registered = campaigns.set_index("campaign")["registration_rms_mm"].notna().get(name, False)
         return worth(errors[errors["campaign"] == name], tables.read(place), noise_rms_mm, bool(registered))
 
-    def models(self, name, beside):
-        """Links to the robot's file with what was found, from a folder; empty where it came as none."""
+    def models(self, name, start):
+        """Links to the robot's corrected file from the folder start; empty for a robot without a file."""
         found = sorted((self.folder / "campaigns" / name).glob("corrected.*"))
-        return [os.path.relpath(place, beside) for place in found]
+        return [os.path.relpath(place, start) for place in found]
 
     def picture(self, name, title):
         """A figure of a path below figures/ without its ending, None where it was not drawn."""
@@ -144,7 +144,7 @@ def write(folder, path, reproduced, campaign=None):
     answers = []
     for name in names:
         answer = json_files.read(results.folder / "campaigns" / name / "verdict.json")
-        drawn = results.picture(f"{name}/gap_map", f"{name}: where it misses")
+        drawn = results.picture(f"{name}/gap_map", f"{name}: residual errors")
         found = results.worth(name, answer["noise_rms_mm"])
         source, models = sources.get(name, "virtual robot of a study"), results.models(name, Path(path).parent)
         answers.append((cards.card(answer, source, found, models), drawn))
@@ -168,31 +168,31 @@ def save(text, path):
 
 
 def _part(results, section):
-    """A section with what there is for it, None where there is nothing."""
+    """A section with its pictures and tables, None where there are none."""
     wanted = [(name, title) for name, title in section.figures] if results.campaign is None else []
-    wanted += [found for own in section.own for found in _own(results, *own)]
-    pictures = [one for one in (results.picture(*each) for each in wanted) if one]
-    grids = [one for one in map(results.grid, section.tables) if one]
+    wanted += [found for own in section.own for found in _of_campaigns(results, *own)]
+    pictures = [picture for picture in (results.picture(*figure) for figure in wanted) if picture]
+    grids = [grid for grid in map(results.grid, section.tables) if grid]
     if section.key == "calibration" and (judged := _trust(results)):
         grids.insert(0, judged)
     return Part(section.key, section.title, section.about, pictures, grids) if pictures or grids else None
 
 
-def _own(results, name, title, needed):
+def _of_campaigns(results, name, title, needed):
     """Places and titles of a figure of every campaign that has rows in the needed table, where one is."""
     folder = results.folder / "figures"
     found = [place.relative_to(folder).with_suffix("") for place in sorted(folder.rglob(f"{name}.svg"))]
-    whose = [(str(place), place.parent.name or results.reproduced) for place in found]
+    owners = [(str(place), place.parent.name or results.reproduced) for place in found]
     known = results.owners() if results.campaign is None else {results.campaign}
     if needed:
         frame = results.frame(needed)
         known &= set() if frame is None else set(frame["campaign"])
-    return [(place, f"{own}: {title}") for place, own in whose if own in known]
+    return [(place, f"{owner}: {title}") for place, owner in owners if owner in known]
 
 
 def _trust(results):
-    """The table of which numbers may be trusted, None where nothing was calibrated."""
+    """The table of which parameters may be trusted, None where nothing was calibrated."""
     frames = [results.frame(name) for name in _TRUST]
     if any(frame is None for frame in frames):
         return None
-    return cells.grid(trust(*frames).dropna(axis="columns", how="all"), "trust", "Which numbers may be trusted")
+    return cells.grid(trust(*frames).dropna(axis="columns", how="all"), "trust", "Which parameters may be trusted")

@@ -1,4 +1,4 @@
-"""Which of a calibration's numbers may be trusted, in words. Values in mm and rad."""
+"""Which parameters of a calibration may be trusted, in words. Values in mm and rad."""
 
 import pandas as pd
 
@@ -6,7 +6,7 @@ from rrru.diagnosis.verdict_text import rounded, with_interval
 from rrru.estimation.intervals import QUANTILE_95
 from rrru.report.cells import MINUS
 
-# a correlation that makes two numbers one, and standard errors to the end of a 95 % interval
+# correlation from which two parameters are not separable, and standard errors to the end of a 95 % interval
 _TOGETHER, _CLEAR = 0.95, QUANTILE_95
 _NO_EFFECTS = ("none", "unexplained")
 COLUMNS = ["campaign", "parameter", "value", "judgement", "with_effects", "true_value", "calibration", "points"]
@@ -15,14 +15,14 @@ COLUMNS = ["campaign", "parameter", "value", "judgement", "with_effects", "true_
 def trust(parameters, correlations, calibrations, corrected, verdicts):
     """A row per campaign and parameter of its calibration on most points, least squares: value, interval and judgement.
 
-    corrected: rows of `gap_parameters`, which say what becomes of the number once the effects are in the model;
+    corrected: rows of `gap_parameters`, the parameters with the effects in the model;
     verdicts: rows of `gap_verdicts`.
     """
     answers = verdicts.set_index("campaign")["effects"]
     by_least_squares = calibrations[calibrations["method"] == "least_squares"]
     widest = by_least_squares.sort_values("points", kind="stable", ascending=False).drop_duplicates("campaign")
     rows = parameters.merge(widest[["campaign", "calibration", "method", "points"]], how="inner")
-    # without effects it is the same calibration, but for the points that a diagnosis leaves out
+    # without effects it is the same calibration, except for the points that a diagnosis leaves out
     with_effects = corrected[~corrected["campaign"].map(answers).isin(_NO_EFFECTS)]
     moved = with_effects.query("effect == 'calibration'")[["campaign", "parameter", "value", "low_95", "high_95"]]
     rows = rows.merge(moved.rename(columns={"value": "moved"}), how="left", on=["campaign", "parameter"])
@@ -72,7 +72,7 @@ def _judged(row, tied):
 
 def _tied(row, correlations):
     """Parameters whose estimates nearly rise and fall with this one's."""
-    own = (correlations["campaign"] == row["campaign"]) & (correlations["calibration"] == row["calibration"])
-    strong = correlations[own & (correlations["correlation"].abs() > _TOGETHER)]
+    of_row = (correlations["campaign"] == row["campaign"]) & (correlations["calibration"] == row["calibration"])
+    strong = correlations[of_row & (correlations["correlation"].abs() > _TOGETHER)]
     pairs = zip(strong["parameter_a"], strong["parameter_b"], strict=True)
     return sorted({name for pair in pairs if row["parameter"] in pair for name in pair} - {row["parameter"]})

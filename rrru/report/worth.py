@@ -1,4 +1,4 @@
-"""What a campaign's calibration is worth on the points of its diagnosis: sizes in mm, measuring noise taken out."""
+"""Residual error before and after a campaign's calibration, in mm, measuring noise subtracted."""
 
 from dataclasses import dataclass
 
@@ -10,7 +10,7 @@ _AXES = "xyz"
 
 @dataclass(frozen=True)
 class Worth:
-    """Root mean square distances at the same points, noise taken out: before any calibration, with one that has seen
+    """Root mean square distances at the same points, noise subtracted: before any calibration, with one that has used
     these points. registered: the instrument's frame had been fitted to the commanded points before.
     """
 
@@ -35,13 +35,13 @@ def worth(errors, points, noise_rms_mm, registered):
 
 
 def sentences(found, left_out_mm):
-    """What a Worth says beside the size at points that were left out of the calibration."""
+    """Sentences on a Worth; left_out_mm: residual error at points that were left out of the calibration."""
     registered = ", once the instrument's frame was fitted" if found.registered else ""
-    size = f"{rounded(found.before_mm)} mm at the same {found.points} points, noise taken out alike"
-    said = [f"Before any calibration it missed by {size}{registered}."]
+    size = f"{rounded(found.before_mm)} mm at the same {found.points} points, with the same noise subtracted"
+    said = [f"Before any calibration the error is {size}{registered}."]
     if left_out_mm >= found.before_mm:
         said.append(
-            f"Where the calibration has seen the points, {rounded(found.seen_mm)} mm is left: it has taken up a part "
-            "of the cause, and its numbers do not carry over to points that were left out."
+            f"At points that the calibration has used, the residual error is {rounded(found.seen_mm)} mm: it has "
+            "absorbed a part of the cause, and its parameters do not carry over to points that were left out."
         )
     return said

@@ -1,4 +1,4 @@
-"""Virtual six-axis arms at stops in no order, read with orientations: what tests of the laws of such campaigns share.
+"""Virtual six-axis arms at stops in no order, read with orientations: shared by tests of the effects of such campaigns.
 
 Lengths mm, angles rad.
 """
@@ -42,10 +42,10 @@ def drives(count, generator):
 def commands(drive):
     """The table of stops at drive values (n, 6), nothing measured yet."""
     frame = pd.DataFrame({"run": 1, "trajectory": "poses", "point": np.arange(1, len(drive) + 1)})
-    told = dict(zip(ARM.parts.columns, drive.T, strict=True))
+    columns = dict(zip(ARM.parts.columns, drive.T, strict=True))
     command = rows.vector_columns("command", ARM.forward(drive))
     nothing = {"time_s": np.nan, "speed_mm_s": np.nan, "payload_kg": np.nan}
-    return frame.assign(**command, **told, **nothing, status="ok")
+    return frame.assign(**command, **columns, **nothing, status="ok")
 
 
 def active(name, coordinates, shape=None, effect=None):
@@ -72,13 +72,13 @@ def measure(effects=(), count=200, seed=1, noise=(NOISE_MM, NOISE_RAD)):
 
 
 def case_of(frame, *names, library=None):
-    """The case of a table, with some laws of the library, at the noise that it has."""
-    laws = {name: find(name, ARM) for name in names} | (library or {})
-    return make_case(frame, reading(frame), MASSES, NOISE_MM, laws, arm_mm=NOISE_MM / NOISE_RAD)
+    """The case of a table, with some effects of the library, at the noise that it has."""
+    effects = {name: find(name, ARM) for name in names} | (library or {})
+    return make_case(frame, reading(frame), MASSES, NOISE_MM, effects, arm_mm=NOISE_MM / NOISE_RAD)
 
 
 def reading(frame):
-    """The arm with every number that a table's readings tell."""
+    """The arm with every parameter that a table's readings determine."""
     return replace(ARM, parameter_set="full").reading(rows.reads(frame))
 
 

@@ -20,9 +20,9 @@ from rrru.robots.rrru3 import Rrru3
 from rrru.simulation.virtual_robot import VirtualRobot
 
 ROBOT = Rrru3()
-SIM = sim(ROBOT)
+MODEL = sim(ROBOT)
 MASSES = Masses()
-# laws of many waves have tests of their own, and these campaigns do not show the others: their robot does not stop,
+# effects of many waves have tests of their own, and these campaigns do not show the others: their robot does not stop,
 # has no thermometer, and all its lengths are calibrated
 _ELSEWHERE = ("drive_error_function", "transmission_orders", "read_before_rest", "thermal_expansion", "tracker_scale")
 EFFECTS = {name: effect for name, effect in GapSettings().library(ROBOT).items() if name not in _ELSEWHERE}
@@ -69,7 +69,9 @@ def measure(effects=(), noise_mm=NOISE_MM, seed=1, plan=None, deviations=None):
 def gap_mm(effects, plan=None):
     """Rms distance that a calibration leaves without noise."""
     frame = measure(effects, 0.0, plan=plan)
-    return calibrate(TargetPositions(SIM, rows.actuators(frame, SIM), rows.measured(frame), rows.command(frame))).rms_mm
+    return calibrate(
+        TargetPositions(MODEL, rows.actuators(frame, MODEL), rows.measured(frame), rows.command(frame))
+    ).rms_mm
 
 
 def drawn(name, seed, leg=0):
@@ -93,7 +95,7 @@ def strong(name, strength, seed=0, leg=0, shape=0):
 
 def case_of(measurements, library=EFFECTS, noise_mm=NOISE_MM):
     """The diagnosis' case of a measurement table."""
-    return make_case(measurements, SIM, MASSES, noise_mm, dict(library))
+    return make_case(measurements, MODEL, MASSES, noise_mm, dict(library))
 
 
 def diagnosed(measurements, noise_mm=NOISE_MM, details=False, settings=None):

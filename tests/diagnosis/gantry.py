@@ -1,6 +1,6 @@
 """A gantry of three slides that is driven along lines, a rectangle and a wave, and its machine written down by hand.
 
-The machine knows nothing of the package's legs and laws. Lengths mm, angles rad, times s.
+The machine uses none of the package's legs and effects. Lengths mm, angles rad, times s.
 """
 
 from itertools import pairwise
@@ -61,11 +61,11 @@ def motion_of(way, time):
     return make_motion(GANTRY, Masses(0.0, 0.0, 0.0), course)
 
 
-class _Play:
-    """Drives that lie at one side of their play (3,) until they have been pushed through it."""
+class _Backlash:
+    """Drives that are at one side of their backlash (3,) until they have been pushed through it."""
 
-    def __init__(self, play_mm, start):
-        self._half, self._at = np.asarray(play_mm) / 2.0, np.asarray(start, dtype=float)
+    def __init__(self, width_mm, start):
+        self._half, self._at = np.asarray(width_mm) / 2.0, np.asarray(start, dtype=float)
 
     def driven(self, way):
         """Where the drives are after going along values (n, 3)."""
@@ -74,25 +74,25 @@ class _Play:
         return self._at
 
 
-def campaign(play_mm=(0.0, 0.0, 0.0), grown=lambda way, time: 0.0, seed=1):
+def campaign(backlash_mm=(0.0, 0.0, 0.0), grown=lambda way, time: 0.0, seed=1):
     """A table of every path there and back, twice; grown: what is added to values (3,) at a time."""
     generator, tables, time = np.random.default_rng(seed), [], 0.0
     passes = [(name, path[::step]) for _ in range(2) for name, path in _PATHS.items() for step in (1, -1)]
-    play, last = _Play(play_mm, passes[0][1][0]), passes[0][1][0]
+    backlash, last = _Backlash(backlash_mm, passes[0][1][0]), passes[0][1][0]
     for number, (name, path) in enumerate(passes, 1):
         real, times = [], []
         for way in path:
-            lies = play.driven(last + np.linspace(0.0, 1.0, _FINE)[:, None] * (way - last))
-            real.append(lies + grown(way, time))
+            drives = backlash.driven(last + np.linspace(0.0, 1.0, _FINE)[:, None] * (way - last))
+            real.append(drives + grown(way, time))
             times.append(time)
             last, time = way, time + _STEP_S
         time += _REST_S
         seen = np.array(real) @ _AXES + NOISE_MM * generator.standard_normal((len(path), 3))
-        told = {"trajectory": name, "run": number, "point": np.arange(1, len(path) + 1), "time_s": times}
+        numbers = {"trajectory": name, "run": number, "point": np.arange(1, len(path) + 1), "time_s": times}
         drives = dict(zip(GANTRY.parts.columns, path.T, strict=True))
         command, measured = GANTRY.forward(path), _as_measured(seen)
         positions = rows.vector_columns("command", command) | rows.vector_columns("measured", measured)
-        tables.append(pd.DataFrame(told | positions | drives))
+        tables.append(pd.DataFrame(numbers | positions | drives))
     return pd.concat(tables, ignore_index=True).assign(speed_mm_s=np.nan, payload_kg=np.nan, status="ok")
 
 

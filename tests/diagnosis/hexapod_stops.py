@@ -1,7 +1,7 @@
-"""A hexapod with backlash that is measured at stops, by NumPy and SciPy alone: no law of the package takes part.
+"""A hexapod with backlash that is measured at stops, by NumPy and SciPy alone, without the package's effect models.
 
-Leg k follows its commanded length only when its play is used up; what it went through between two stops is a straight
-line of the tool or of the drives' values, in 400 steps. Lengths in mm, angles in rad.
+Leg k follows its commanded length only when its backlash is used up; what it went through between two stops is a
+straight line of the tool or of the drives' values, in 400 steps. Lengths in mm, angles in rad.
 """
 
 import numpy as np
@@ -45,15 +45,15 @@ def poses(order, generator):
 
 
 def reached(order, between, width_mm, seed=0):
-    """Commanded and actual lengths (125, 6) at the stops of legs with play, and the poses."""
+    """Commanded and actual lengths (125, 6) at the stops of legs with backlash, and the poses."""
     position, turn = poses(order, np.random.default_rng(seed))
     commanded = lengths(position, turn)
-    own = commanded[0] - 0.5 * width_mm
-    actual = [own]
+    length = commanded[0] - 0.5 * width_mm
+    actual = [length]
     for k in range(1, len(commanded)):
-        for told in way((position[k - 1], turn[k - 1]), (position[k], turn[k]), between):
-            own = np.clip(own, told - 0.5 * width_mm, told + 0.5 * width_mm)
-        actual.append(own)
+        for command in way((position[k - 1], turn[k - 1]), (position[k], turn[k]), between):
+            length = np.clip(length, command - 0.5 * width_mm, command + 0.5 * width_mm)
+        actual.append(length)
     return commanded, np.array(actual), (position, turn)
 
 
@@ -83,6 +83,6 @@ def file_of(order, between, width_mm=0.1, seed=0):
     position, turn = _standing(actual + _ERROR_MM * generator.standard_normal(6), start, base, platform)
     seen = np.stack([position + turn @ np.array(place) for place in PLACES.values()], axis=1).reshape(-1, 3)
     seen = seen + NOISE_MM * generator.standard_normal(seen.shape)
-    told = dict(zip(DRIVES, np.repeat(commanded, len(PLACES), axis=0).T, strict=True))
+    drives = dict(zip(DRIVES, np.repeat(commanded, len(PLACES), axis=0).T, strict=True))
     read = {f"measured_{axis}_mm": column for axis, column in zip("xyz", seen.T, strict=True)}
-    return pd.DataFrame({"trajectory": "stops", "target": np.tile([*PLACES], len(commanded)), **told, **read})
+    return pd.DataFrame({"trajectory": "stops", "target": np.tile([*PLACES], len(commanded)), **drives, **read})

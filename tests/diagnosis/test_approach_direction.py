@@ -32,7 +32,7 @@ WIDTHS = np.full(3, 1e-8)
 
 
 @pytest.mark.parametrize("jitter", [1e-6, 1e-5, 1e-4])
-def test_the_jitter_of_a_drive_is_found_beside_its_motion(jitter):
+def test_the_jitter_of_a_drive_is_found_together_with_its_motion(jitter):
     """A swing of 40 points a period, a slow drive and one at rest, in runs of 30 points."""
     steps, generator = np.arange(300), np.random.default_rng(1)
     drive = np.stack([0.3 * np.sin(2.0 * np.pi * steps / 40.0), 1e-3 * steps, np.zeros(300)], axis=1)
@@ -62,7 +62,7 @@ def test_a_drive_that_turns_back_at_a_reading_leaves_its_sense_open_and_one_betw
 
 
 def test_where_two_interpolations_are_apart_none_tells_where_a_drive_turns_back():
-    """One crest lies half a step beside a reading, by another path a quarter: both readings beside it are open."""
+    """One crest is half a step from a reading, by another path a quarter: both readings next to it are open."""
     path, index = _swing(4.0)
     other, between = path.copy(), slice(25, 32)
     course = SimpleNamespace(path_drive=path, path_index=index, drive=path[index])
@@ -132,19 +132,19 @@ def _open(case, share, seed=0):
 
 @pytest.mark.parametrize("acting", [(), ("backlash",), ("drive_compliance",), ("encoder_eccentricity", "backlash")])
 def test_open_senses_change_no_verdict_and_every_reading_counts(acting):
-    """At two thirds of the points nobody knows the senses; the robot's errors are found as if they were known."""
+    """At two thirds of the points the senses are unknown; the robot's errors are found as if they were known."""
     frame = measure(tuple(strong(name, 4.0) for name in acting))
     found = infer(_open(case_of(frame), 0.66), Prior())
     assert found.case.count == len(frame) and found.case.known["backlash"].mean() < 0.35
     assert found.hypothesis.effects == set(acting) and found.posterior.marginal("backlash") > 0.9 * (
         "backlash" in acting
     )
-    # the open senses are found where play acts: no more than the noise is left
+    # the open senses are found where backlash acts: no more than the noise is left
     assert np.sqrt((found.case.residual(found.state) ** 2).mean()) < 1.2 * found.case.noise_mm
 
 
-def test_a_set_that_imitates_play_does_not_win_by_the_readings_of_open_senses():
-    """A law of the drives' values may explain readings at which play says nothing: that is none of its merits."""
+def test_a_set_confounded_with_backlash_does_not_win_by_the_readings_of_open_senses():
+    """An effect of the drives' values may explain readings at which backlash predicts nothing: that does not count."""
     case = _open(case_of(measure((strong("backlash", 4.0),))), 0.66)
     found = infer(case, Prior()).posterior
     assert found.sets()[frozenset({"backlash"}), False] > 0.8 and found.probability_unexplained < 0.1
@@ -167,8 +167,8 @@ def _along_lines(effects, jitter_rad, seed=4):
     run = np.repeat(np.arange(1, len(lines) + 1), [len(line) for line in lines])
     drive = np.concatenate(lines)
     frame = arms.commands(drive).assign(run=run)
-    told = rows.vector_columns("measured", rows.command(frame))
-    motion = make_case(frame.assign(**told), arm, arms.MASSES, 1.0, {}).motion
+    measured = rows.vector_columns("measured", rows.command(frame))
+    motion = make_case(frame.assign(**measured), arm, arms.MASSES, 1.0, {}).motion
     # the robot itself knows how it came
     motion = replace(motion, approach=np.full_like(motion.drive, np.nan))
     twists = arm.twists_of(arms.ERRORS) + together(effects, motion).twists
@@ -180,7 +180,7 @@ def _along_lines(effects, jitter_rad, seed=4):
 
 
 def _of_arm(frame, *names):
-    """The case of an arm's table, with all that its readings tell."""
+    """The case of an arm's table, with all that its readings determine."""
     library = {name: find(name, arms.ARM) for name in names}
     robot = as_measured(replace(arms.ARM, parameter_set="full"), frame, (), False)
     return require_determined(make_case(frame, sim(robot), arms.MASSES, arms.NOISE_MM, library))
@@ -195,7 +195,7 @@ def along_lines():
 
 def test_jitter_of_joint_values_changes_neither_verdict_nor_errors(along_lines):
     plain, jittered = along_lines
-    # at the very first reading the simulated play is in its middle, which is no side
+    # at the very first reading the simulated backlash is in its middle, which is no side
     assert plain.case.used[1:].all() and jittered.case.used[1:].all()
     assert jittered.case.known["backlash"].mean() > 0.8 * plain.case.known["backlash"].mean() > 0.5
     assert plain.hypothesis.effects == jittered.hypothesis.effects == {"backlash"}
@@ -205,7 +205,7 @@ def test_jitter_of_joint_values_changes_neither_verdict_nor_errors(along_lines):
 
 
 def test_where_hardly_a_sense_is_known_only_play_is_not_tested():
-    """At 5 of 250 stops: all readings find the compliance, and a sentence says why play was not looked for."""
+    """At 5 of 250 stops: all readings find the compliance, and a sentence says why backlash was not tested."""
     stiff = np.array([0.0, 6e-9, 1.2e-8, 0.0, 2e-8, 0.0])
     frame = arms.measure((arms.active("drive_compliance", stiff),), 250)
     frame["run"] = np.maximum(np.arange(len(frame)) - 4, 1)
@@ -222,8 +222,8 @@ def test_too_few_readings_are_refused_with_what_to_do():
     count = len(case.mechanism.parameters)
     least = count + OPTIONS.min_spare_numbers
     more = int(np.ceil((least - 30) / 3.0))
-    told = f"30 numbers read at 10 poses .* {count} parameters; .* least {least}: measure {more} more"
-    with pytest.raises(FitError, match=told):
+    message = f"30 numbers read at 10 poses .* {count} parameters; .* least {least}: measure {more} more"
+    with pytest.raises(FitError, match=message):
         require_determined(arms.case_of(frame.drop(columns=[f"measured_r{axis}_rad" for axis in "xyz"])))
 
 

@@ -1,4 +1,4 @@
-"""The diagnosis of a six-axis arm at stops in no order: rough functions of the drives and sharp waves told apart."""
+"""The diagnosis of a six-axis arm at stops in no order: rough functions of the drives and sharp waves are separated."""
 
 import numpy as np
 import pytest
@@ -9,7 +9,7 @@ from rrru.effects import drive_error_function
 from rrru.effects.library import find
 from tests.diagnosis import arms
 
-_LAWS = (
+_EFFECTS = (
     "drive_error_function",
     "transmission_orders",
     "transmission_error",
@@ -21,20 +21,20 @@ _COUNT = 200
 
 @pytest.fixture(autouse=True)
 def few_orders(monkeypatch):
-    """Rough functions of sixteen waves per turn: 192 numbers, which 200 stops tell."""
+    """Rough functions of sixteen waves per turn: 192 coefficients, which 200 stops determine."""
     monkeypatch.setattr(drive_error_function, "ORDERS", np.arange(1, 17))
 
 
 def _diagnosed(acting, seed):
     frame = arms.measure(acting, _COUNT, seed)
     robot = MeasuredRobot(arms.reading(frame), arms.MASSES, arms.NOISE_MM, "arm", arms.NOISE_RAD)
-    return diagnose(frame, robot, GapSettings(_LAWS, draws=10), details=False)
+    return diagnose(frame, robot, GapSettings(_EFFECTS, draws=10), details=False)
 
 
 def test_distances_are_those_of_positions_where_orientations_are_read_too():
     """Turns of a precise instrument weigh 5 m: mixed with positions they would state eleven times the distance."""
-    law = find("encoder_eccentricity", arms.ARM)
-    acting = arms.active("", np.full(len(law.coordinates), 4e-4), {}, law)
+    effect = find("encoder_eccentricity", arms.ARM)
+    acting = arms.active("", np.full(len(effect.coordinates), 4e-4), {}, effect)
     noise = arms.NOISE_MM, 4e-6
     frame = arms.measure((acting,), _COUNT, 1, noise)
     robot = MeasuredRobot(arms.reading(frame), arms.MASSES, noise[0], "arm", noise[1])
@@ -63,7 +63,7 @@ def test_distances_are_those_of_positions_where_orientations_are_read_too():
 
 
 def _rough(spectrum, seed):
-    """A function of each drive drawn from the law's own prior, and its coefficients (c,)."""
+    """A function of each drive drawn from the effect's own prior, and its coefficients (c,)."""
     effect = find("drive_error_function", arms.ARM)
     size = effect.coordinates.spectra[spectrum]
     values = size * np.random.default_rng(100 + seed).standard_normal(len(size))
@@ -77,10 +77,10 @@ def test_a_rough_function_of_all_drives_is_named(spectrum, seed):
     assert found.verdict["effects"] == "drive_error_function" and found.verdict["share_closed"] > 0.8
     assert found.verdict["noise_rms_mm"] == pytest.approx(np.sqrt(3.0) * arms.NOISE_MM, rel=0.15)
     (values,) = found.state.effects.values()
-    # functions along the drives' ranges, but for what the calibration's own numbers make
+    # functions along the drives' ranges, except for what the calibration's own parameters make
     motion = found.inference.case.motion
-    law = found.inference.case.library["drive_error_function"]
-    for own, true, made in zip(np.split(values, 6), np.split(truth, 6), law.along_drives(motion), strict=True):
+    effect = found.inference.case.library["drive_error_function"]
+    for own, true, made in zip(np.split(values, 6), np.split(truth, 6), effect.along_drives(motion), strict=True):
         off, whole = made @ (own - true), made @ true
         assert np.std(off) < 0.5 * np.std(whole)
 
@@ -106,19 +106,19 @@ def test_three_sharp_orders_of_different_drives_are_named(waves, size_rad):
     found = _diagnosed((acting,), 4)
     assert found.verdict["effects"] == "transmission_orders" and found.verdict["share_closed"] > 0.7
     case = found.inference.case
-    law, (values,) = case.library["transmission_orders"], found.state.effects.values()
-    told = {}
-    for parameter, sine, cosine in zip(law.parameters.names[::2], values[::2], values[1::2], strict=True):
+    effect, (values,) = case.library["transmission_orders"], found.state.effects.values()
+    amplitudes = {}
+    for parameter, sine, cosine in zip(effect.parameters.names[::2], values[::2], values[1::2], strict=True):
         _, drive, order = parameter.split("_")
-        told[int(drive) - 1, float(order)] = np.hypot(sine, cosine)
+        amplitudes[int(drive) - 1, float(order)] = np.hypot(sine, cosine)
     step = 2.0 * np.pi / np.ptp(case.motion.drive, axis=0)
     for (drive, order), amplitude in zip(waves, size, strict=True):
-        near = [a for (k, one), a in told.items() if k == drive and abs(one - order) < 0.3 * step[k]]
+        near = [a for (k, one), a in amplitudes.items() if k == drive and abs(one - order) < 0.3 * step[k]]
         assert near and max(near) == pytest.approx(amplitude, rel=0.35)
 
 
-def test_sharp_orders_are_found_behind_a_law_that_hides_them():
-    """Drives that give way make a gap twenty times theirs, which looks like many waves at first."""
+def test_sharp_orders_are_found_behind_an_effect_that_hides_them():
+    """Compliant drives make a gap twenty times theirs, which looks like many waves at first."""
     acting, _ = _sharp(((0, 17.0), (2, 31.0), (4, 9.0)), 6e-5, 1)
     found = _diagnosed((acting, arms.active("drive_compliance", [5e-8] * 6)), 1)
     named = set(found.verdict["effects"].split("+"))

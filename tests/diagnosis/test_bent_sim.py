@@ -71,7 +71,7 @@ def _diagnosed(robot, seed):
 
 
 def test_what_the_linear_sim_lacks_is_not_unexplained():
-    """A robot on which it was, 0.026 mm, though the law is the plant's own and the exact sim fits to the noise."""
+    """A robot on which it was, 0.026 mm, though the effect is the plant's own and the exact model fits to the noise."""
     known, found = _diagnosed(_PLAY, 260711)
     assert found.verdict["effects"] == "backlash"
     left = found.inference.case.residual(found.state)

@@ -25,7 +25,7 @@ _POINTS, _ROUGH, _FINE = 16, 14, 8
 _SIZES = np.random.default_rng(9).uniform(0.3, 3.0, _ROUGH)
 
 
-# prior mean of a step of the weight, which "other" bears
+# prior mean of a step of payload and tilt, under which "other" deflects
 _ABOUT = -1.3
 
 
@@ -48,16 +48,16 @@ LIBRARY = {
 ROUGH, FINE, FREE, OTHER, PULL = (EffectTerm(name) for name in LIBRARY)
 
 
-def _evidence(seed, with_law=False, smooth=False):
+def _evidence(seed, with_shapes=False, smooth=False):
     """Evidence on random numbers: three calibration columns and the library's, of stops in no order unless smooth."""
     generator, shape = np.random.default_rng(seed), (_POINTS, 3)
     columns = {(name, 0): generator.normal(size=(*shape, len(e.coordinates))) for name, e in LIBRARY.items()}
-    laws = {"free": 0.03 * generator.normal(size=(*shape, 1))} if with_law else {}
-    weight = {("other", 0): 0.2 * generator.normal(size=(*shape, 3))} if with_law else {}
+    shape_columns = {"free": 0.03 * generator.normal(size=(*shape, 1))} if with_shapes else {}
+    weight = {("other", 0): 0.2 * generator.normal(size=(*shape, 3))} if with_shapes else {}
     base = generator.normal(size=(*shape, 3)) * [1.0, 30.0, 500.0]
     data = 0.2 * generator.normal(size=shape) + 0.1 * columns["pull", 0][..., 0]
     steps = (("a number", 1.3, 2.3, _ABOUT),)
-    linear = LinearizedProblem(data, base, columns, laws, {}, None, weight, steps)
+    linear = LinearizedProblem(data, base, columns, shape_columns, {}, None, weight, steps)
     return ModelEvidence(LIBRARY, linear, np.ones(_POINTS, dtype=int), NoiseModel.white(NOISE_MM), smooth)
 
 
@@ -101,8 +101,8 @@ class Dense:
             owner.append(len(terms))
             weight.append(True)
         data = linear.data.ravel() / NOISE_MM
-        told = (np.array(one) for one in (sizes, owner, np.multiply(weight, _ABOUT), weight))
-        return cls(data, base, np.concatenate(columns, axis=1), *told)
+        arrays = (np.array(one) for one in (sizes, owner, np.multiply(weight, _ABOUT), weight))
+        return cls(data, base, np.concatenate(columns, axis=1), *arrays)
 
     @property
     def likelihood(self):
@@ -116,13 +116,13 @@ class Dense:
 
     @property
     def averaged(self):
-        """Log likelihood averaged over a weight that is as told, a tenth as doubtful, and one that is not."""
-        told = replace(self, size=np.where(self.weight, 0.1 * self.size, self.size))
-        return logsumexp([told.likelihood, self.likelihood], b=[0.5, 0.5])
+        """Log likelihood averaged over a payload as stated, with a tenth of the deviation, and one that is not."""
+        stated = replace(self, size=np.where(self.weight, 0.1 * self.size, self.size))
+        return logsumexp([stated.likelihood, self.likelihood], b=[0.5, 0.5])
 
     @property
     def as_it_is(self):
-        """Log likelihood under a weight that is just that of the linearisation."""
+        """Log likelihood under exactly the payload of the linearisation."""
         nothing = np.zeros(len(self.about))
         return replace(self, size=np.where(self.weight, 1e-4 * self.size, self.size), about=nothing).likelihood
 
@@ -160,19 +160,19 @@ class Dense:
 
 
 def _by_weight(evidence, terms):
-    """What a step of the weight makes (3n,) of "other" as large as it is beside the others, the broadest left out, and
-    the prior scale under which it is that large.
+    """Change (3n,) of "other" by a step of the payload, at its size with the others except the broadest, and the
+    prior scale under which it has that size.
     """
     rest, linear = [term for term in terms if term != ROUGH], evidence.linear
     known = replace(evidence, linear=replace(linear, by_weight={}))
     dense = Dense.of(known, rest, [PRIOR_SCALES[-1]] * len(rest))
-    own = dense.owner == rest.index(OTHER)
-    at_least = np.sqrt(((dense.mean / dense.size)[own] ** 2).mean()) * PRIOR_SCALES[-1]
-    return linear.by_weight["other", 0].reshape(-1, 3) @ dense.mean[own], at_least
+    of_other = dense.owner == rest.index(OTHER)
+    at_least = np.sqrt(((dense.mean / dense.size)[of_other] ** 2).mean()) * PRIOR_SCALES[-1]
+    return linear.by_weight["other", 0].reshape(-1, 3) @ dense.mean[of_other], at_least
 
 
-def _borne(evidence, terms, prior_scales, number, least):
-    """Log likelihood where under less than the least prior scale of one term the weight stays, at the same cost."""
+def _with_nuisance(evidence, terms, prior_scales, number, least):
+    """Log likelihood where below the least prior scale of one term the payload stays, at the same cost."""
     given = Dense.of(evidence, terms, prior_scales)
     if prior_scales[number] >= least:
         return given.averaged
@@ -193,24 +193,24 @@ _GRIDS = ([0.3, 3.0], [1.0, 30.0, 100.0], [0.1, 10.0])
 
 
 @pytest.mark.parametrize("terms", _SETS, ids=lambda terms: "+".join(term.effect for term in terms))
-@pytest.mark.parametrize("with_law", [False, True], ids=["", "doubted"])
-def test_scores_equal_a_dense_marginal_likelihood(terms, with_law):
-    evidence = _evidence(1, with_law)
+@pytest.mark.parametrize("with_shapes", [False, True], ids=["", "with shapes"])
+def test_scores_equal_a_dense_marginal_likelihood(terms, with_shapes):
+    evidence = _evidence(1, with_shapes)
     grids = _GRIDS[: len(terms)]
     found, combinations = evidence.over_strengths(terms, grids)
     assert [tuple(one) for one in combinations] == list(product(*grids)) and found.shape == (1, len(combinations))
     expected = [Dense.of(evidence, terms, one).averaged for one in combinations]
-    if with_law and OTHER in terms:
+    if with_shapes and OTHER in terms:
         # half the prior scale of what was found is the nearest one that is tried
         number, least = terms.index(OTHER), 0.5 * _by_weight(evidence, terms)[1]
-        expected = [_borne(evidence, terms, one, number, least) for one in combinations]
+        expected = [_with_nuisance(evidence, terms, one, number, least) for one in combinations]
     np.testing.assert_allclose(found[0], expected, rtol=1e-8)
 
 
 @pytest.mark.parametrize("size", [3.0, 8.0, 20.0, 60.0])
 @pytest.mark.parametrize("off", [0.0, 1.5, -2.5])
-def test_evidence_where_the_weight_is_fitted_is_that_of_the_exact_product(size, off):
-    """One coefficient c and one number w of the weight: what they make, c (A + w B), integrated over both."""
+def test_evidence_where_the_payload_is_fitted_is_that_of_the_exact_product(size, off):
+    """One coefficient c and one error w of the payload: their product c (A + w B) integrated over both."""
     generator, shape = np.random.default_rng(3), (_POINTS, 3)
     a, b = generator.normal(size=(2, *shape, 1))
     b = 0.2 * (a + b)
@@ -228,12 +228,12 @@ def test_evidence_where_the_weight_is_fitted_is_that_of_the_exact_product(size, 
     slope = [(a.T @ data).item() / NOISE_MM**2, (b.T @ data).item() / NOISE_MM**2]
     gram = np.array([(x.T @ y).item() for x, y in ((a, a), (a, b), (b, b))]) / NOISE_MM**2
     moment, square = slope[0] + w * slope[1], gram[0] + 2.0 * w * gram[1] + w**2 * gram[2]
-    told = logsumexp([norm.logpdf(w, -off, 0.1), norm.logpdf(w, -off, 1.0)], axis=0, b=0.5)
+    log_prior = logsumexp([norm.logpdf(w, -off, 0.1), norm.logpdf(w, -off, 1.0)], axis=0, b=0.5)
     exact = []
     for (prior_scale,) in grid:
         wide = 1.0 + square * (prior_scale * unit) ** 2
         given = 0.5 * moment**2 * (prior_scale * unit) ** 2 / wide - 0.5 * np.log(wide)
-        exact.append(logsumexp(given + told) + np.log(w[1] - w[0]))
+        exact.append(logsumexp(given + log_prior) + np.log(w[1] - w[0]))
     gained = found[0] - evidence.none[0]
     assert abs(logsumexp(gained) - logsumexp(exact)) < 0.3
     likely = np.array(exact) > max(exact) - 2.0
@@ -242,7 +242,7 @@ def test_evidence_where_the_weight_is_fitted_is_that_of_the_exact_product(size, 
     assert (gained[~likely] < max(exact) - 1.0).all()
 
 
-def test_alone_it_is_averaged_over_all_strengths_and_levels():
+def test_alone_it_is_averaged_over_all_prior_scales_and_levels():
     evidence = _evidence(2, smooth=True)
     found, grid = evidence.over_strengths((ROUGH,))
     assert found.shape == (len(DISCREPANCY_SCALES), len(PRIOR_SCALES)) and grid[:, 0].tolist() == PRIOR_SCALES.tolist()
@@ -256,8 +256,8 @@ def test_alone_it_is_averaged_over_all_strengths_and_levels():
 @pytest.mark.parametrize("terms", _SETS[:-2], ids=lambda terms: "+".join(term.effect for term in terms))
 def test_a_broad_term_is_what_the_same_term_is_that_is_not(terms):
     """At every level of a smooth discrepancy: being averaged over first changes nothing."""
-    broad = _evidence(3, with_law=True, smooth=True)
-    # what the weight changes is taken from what is found beside the broad term
+    broad = _evidence(3, with_shapes=True, smooth=True)
+    # the changes by the payload are made with coefficients found together with the broad term
     broad = replace(broad, linear=replace(broad.linear, by_weight={}))
     rough = LIBRARY["rough"].coordinates
     plain = replace(
@@ -279,7 +279,7 @@ def _with_positive(evidence, terms, prior_scales):
         moved = replace(rest, data=rest.data - c * column)
         return moved.likelihood - 0.5 * (c / size) ** 2 - np.log(size * np.sqrt(0.5 * np.pi))
 
-    # a parabola in the coefficient: three of its values tell it
+    # a parabola in the coefficient: three of its values determine it
     a, b, c = np.polyfit([-size, 0.0, size], [log_density(x) for x in (-size, 0.0, size)], 2)
     top, width = -0.5 * b / a, (-2.0 * a) ** -0.5
     low = max(top - 12.0 * width, 0.0)
@@ -290,7 +290,7 @@ def _with_positive(evidence, terms, prior_scales):
 
 @pytest.mark.parametrize("terms", [(ROUGH, PULL), (PULL, ROUGH), (PULL, FREE, ROUGH)])
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_beside_a_positive_coefficient_half_its_prior_is_left(terms, sign):
+def test_with_a_positive_coefficient_half_its_prior_is_left(terms, sign):
     evidence = _evidence(4)
     linear = evidence.linear
     evidence = replace(evidence, linear=replace(linear, data=sign * linear.data))
@@ -301,10 +301,10 @@ def test_beside_a_positive_coefficient_half_its_prior_is_left(terms, sign):
 
 
 @pytest.mark.parametrize("terms", _SETS, ids=lambda terms: "+".join(term.effect for term in terms))
-@pytest.mark.parametrize("with_law", [False, True], ids=["", "doubted"])
-def test_coefficients_and_what_they_explain_are_the_direct_solution(terms, with_law):
-    evidence = _evidence(5, with_law)
-    # the weight's share of it has a test of its own
+@pytest.mark.parametrize("with_shapes", [False, True], ids=["", "with shapes"])
+def test_coefficients_and_what_they_explain_are_the_direct_solution(terms, with_shapes):
+    evidence = _evidence(5, with_shapes)
+    # the payload's share of it has a test of its own
     evidence = replace(evidence, linear=replace(evidence.linear, by_weight={}))
     prior_scales = np.array([3.0, 0.5, 10.0])[: len(terms)]
     dense = Dense.of(evidence, terms, prior_scales)
@@ -323,7 +323,7 @@ def test_coefficients_and_what_they_explain_are_the_direct_solution(terms, with_
 @pytest.mark.parametrize("terms", [(OTHER,), (FREE, OTHER)])
 def test_under_an_unknown_weight_coefficients_are_a_mixtures(terms):
     """Means and covariance of both cases by their probabilities, each by least squares of the whole."""
-    evidence, prior_scales = _evidence(6, with_law=True), {1: [300.0], 2: [3.0, 300.0]}[len(terms)]
+    evidence, prior_scales = _evidence(6, with_shapes=True), {1: [300.0], 2: [3.0, 300.0]}[len(terms)]
     wide = Dense.of(evidence, terms, prior_scales)
     cases = [replace(wide, size=np.where(wide.weight, share * wide.size, wide.size)) for share in (0.1, 1.0)]
     chance = np.exp([one.likelihood - logsumexp([case.likelihood for case in cases]) for one in cases])
@@ -367,8 +367,8 @@ def test_an_average_is_an_integral_over_the_coefficients():
     for values in generator.normal(size=(4, 2)):
         moved = multivariate_normal.logpdf(data - columns[:, others] @ values, cov=averaged)
         gram, moment = made.rest(others)
-        foretold = moment @ values - 0.5 * values @ gram @ values
-        assert moved - multivariate_normal.logpdf(data, cov=averaged) == pytest.approx(foretold, rel=1e-8)
+        predicted = moment @ values - 0.5 * values @ gram @ values
+        assert moved - multivariate_normal.logpdf(data, cov=averaged) == pytest.approx(predicted, rel=1e-8)
     gram, moment = made.rest(np.array([3]))
     whole = made.rest(others)
     assert gram[0, 0] == pytest.approx(whole[0][1, 1]) and moment[0] == pytest.approx(whole[1][1])
@@ -382,8 +382,8 @@ def test_an_average_is_an_integral_over_the_coefficients():
     np.testing.assert_allclose(found, expected, rtol=1e-8)
 
 
-def test_of_sizes_that_the_campaign_has_chosen_one_strength_is_just_these():
-    """Many coefficients tell their common size far better than the prior scales that are tried lie apart."""
+def test_of_sizes_that_the_campaign_has_chosen_one_prior_scale_is_just_these():
+    """Many coefficients determine their common size far better than the grid of prior scales."""
     plain, rough = _evidence(8), LIBRARY["rough"].coordinates
     for factor in (0.01, 0.17, 1.0, 2.3):
         typical = factor * rough.typical

@@ -7,7 +7,18 @@ from rrru.calibration.calibrate import calibrate
 from rrru.campaign import measurements as rows
 from rrru.diagnosis.settings import GapSettings
 from rrru.estimation.observations.target_positions import TargetPositions
-from tests.diagnosis.campaigns import FAST, FORWARD, NOISE_MM, REVERSE, SIM, active, diagnosed, measure, plan_of, strong
+from tests.diagnosis.campaigns import (
+    FAST,
+    FORWARD,
+    MODEL,
+    NOISE_MM,
+    REVERSE,
+    active,
+    diagnosed,
+    measure,
+    plan_of,
+    strong,
+)
 
 
 def _budget(frame, noise_mm=NOISE_MM):
@@ -19,8 +30,8 @@ def _budget(frame, noise_mm=NOISE_MM):
 def _left(effects):
     """What the calibration leaves (n, 3) of the effects' own, by the exact closure without noise."""
     frame = measure(effects, noise_mm=0.0)
-    driven = rows.actuators(frame, SIM), rows.measured(frame), rows.command(frame)
-    return calibrate(TargetPositions(SIM, *driven)).residual_mm
+    driven = rows.actuators(frame, MODEL), rows.measured(frame), rows.command(frame)
+    return calibrate(TargetPositions(MODEL, *driven)).residual_mm
 
 
 def _shaken(frame, size_mm, seed=3):
@@ -80,13 +91,13 @@ def test_what_nothing_predicts_is_unexplained():
     frame = frame.assign(**rows.vector_columns("measured", rows.measured(frame) + bulge))
     budget, found = _budget(frame)
     assert "unexplained" in found.verdict["effects"] and budget.loc["unexplained", "probability"] > 0.9
-    driven = rows.actuators(frame, SIM), rows.measured(frame), rows.command(frame)
-    total = (calibrate(TargetPositions(SIM, *driven)).residual_mm ** 2).sum(axis=1).mean() - 3.0 * NOISE_MM**2
+    driven = rows.actuators(frame, MODEL), rows.measured(frame), rows.command(frame)
+    total = (calibrate(TargetPositions(MODEL, *driven)).residual_mm ** 2).sum(axis=1).mean() - 3.0 * NOISE_MM**2
     assert budget.loc["unexplained", "rms_mm"] ** 2 > 0.5 * total
 
 
 def test_whoever_does_not_know_the_weight_still_knows_what_gives_way_in_all():
-    """Of one load a compliance is told no better than the mass; what it makes of the gap is."""
+    """With one load a compliance is determined no better than the mass; its part of the gap is."""
     frame = measure((active("drive_compliance", [8e-8, 6e-8, 9e-8]),), plan=plan_of((FORWARD, REVERSE, FAST)))
     known = {"weight": {"extra_kg": 0.0, "lean_x": 0.0, "lean_y": 0.0}}
     shares, errors = [], []

@@ -190,7 +190,7 @@ def test_without_times_a_lag_cannot_be_named_and_the_notes_say_so(lagging):
     assert "servo_lag not tested" in verdict["notes"] and "thermal_growth not tested" in verdict["notes"]
 
 
-def test_points_that_are_not_used_are_told_where_they_are_many(lagging):
+def test_points_that_are_not_used_are_reported_where_they_are_many(lagging):
     whole, _ = _of_one("servo_lag")
     spoilt = np.arange(len(lagging)) % 4 == 1
     verdict = diagnosed(lagging.assign(status=np.where(spoilt, "outlier", lagging["status"]))).verdict

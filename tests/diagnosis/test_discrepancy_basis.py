@@ -10,7 +10,7 @@ from rrru.diagnosis.make_problem import make_case
 from rrru.effects.protocol import Contribution
 from rrru.robots.delta import Delta
 from rrru.robots.ptt3 import Ptt3
-from tests.diagnosis.campaigns import MASSES, NOISE_MM, SIM, case_of, diagnosed, measure, robot_of
+from tests.diagnosis.campaigns import MASSES, MODEL, NOISE_MM, case_of, diagnosed, measure, robot_of
 
 
 @pytest.fixture(scope="module")
@@ -25,7 +25,7 @@ def test_a_function_is_linear_in_its_coefficients_and_about_as_large_as_they_are
 
     def made(values):
         twists = function.contribute(case.motion, values).twists
-        acting = {SIM.legs.sites[k] for k in np.flatnonzero(twists.any(axis=(0, 2)))}
+        acting = {MODEL.legs.sites[k] for k in np.flatnonzero(twists.any(axis=(0, 2)))}
         assert acting <= ({f"leg {leg} drive" for leg in (1, 2, 3)} if function.per_leg else {"world"})
         return twists
 
@@ -57,7 +57,7 @@ class _Constant:
 
 
 def test_functions_of_a_drive_are_as_large_as_its_unit_allows():
-    for robot, typical in ((SIM, 1e-4), (Delta(), 1e-4), (Ptt3(), 0.01)):
+    for robot, typical in ((MODEL, 1e-4), (Delta(), 1e-4), (Ptt3(), 0.01)):
         functions = unknown_functions(robot)
         assert list(functions) == list(UNKNOWN)
         of_drives = [function for function in functions.values() if function.per_leg]
@@ -69,7 +69,7 @@ def test_functions_of_a_drive_are_as_large_as_its_unit_allows():
 def test_functions_of_what_does_not_vary_or_is_unknown_are_left_out():
     frame = measure()
     assert set(UNKNOWN) <= set(case_of(frame).library) and not set(UNKNOWN) & set(case_of(frame).effects)
-    bare = make_case(frame.assign(time_s=np.nan, payload_kg=2.0), SIM, MASSES, NOISE_MM, {})
+    bare = make_case(frame.assign(time_s=np.nan, payload_kg=2.0), MODEL, MASSES, NOISE_MM, {})
     assert set(bare.library) == {"unknown_drive", "unknown_affine", "unknown_place"}
 
 

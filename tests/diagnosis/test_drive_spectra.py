@@ -33,7 +33,7 @@ def _made(arm, waves, generator, noise_mm=NOISE_MM):
 
 
 def _resolution(arm):
-    """Difference of orders that each drive (K,) tells apart."""
+    """Difference of orders that each drive (K,) resolves."""
     return 2.0 * np.pi / np.ptp(arm[3], axis=0)
 
 
@@ -61,7 +61,7 @@ def test_three_sharp_waves_are_found_and_next_to_nothing_else(arm):
 
 
 def test_noise_alone_has_waves_as_rarely_as_their_price_says(arm):
-    """A wave costs as much as all resolved ones together, and the m numbers beside: one campaign of about m / 3."""
+    """A wave costs as much as all resolved ones together, and the m numbers: one campaign of about m / 3."""
     trials, found = 150, 0
     for seed in range(trials):
         waves, log_prior = pursue(_made(arm, [], np.random.default_rng(seed)), arm[1], arm[2], arm[3])
@@ -70,23 +70,23 @@ def test_noise_alone_has_waves_as_rarely_as_their_price_says(arm):
     assert found <= 3
 
 
-def test_numbers_that_are_fitted_beside_them_make_waves_no_more_frequent(arm):
+def test_parameters_that_are_fitted_with_them_make_waves_no_more_frequent(arm):
     """Of 40 stops and 90 numbers that are fitted there is little left: chance takes a larger share of that."""
     rows = np.isin(arm[0].at, np.arange(1, 41))
     _, basis, effect, drive = arm
     generator, found = np.random.default_rng(0), 0
     calibration = basis.reshape(len(drive), 3, -1)[rows].reshape(3 * rows.sum(), -1)
-    beside, _ = np.linalg.qr(np.concatenate([calibration, generator.normal(size=(3 * rows.sum(), 63))], axis=1))
+    nuisance, _ = np.linalg.qr(np.concatenate([calibration, generator.normal(size=(3 * rows.sum(), 63))], axis=1))
     for _ in range(200):
         data = generator.standard_normal(3 * rows.sum())
-        waves, _ = pursue(data - beside @ (beside.T @ data), beside, effect[rows], drive[rows])
+        waves, _ = pursue(data - nuisance @ (nuisance.T @ data), nuisance, effect[rows], drive[rows])
         found += bool(waves)
     # three of 240 would be usual
     assert found <= 9
 
 
 def test_waves_of_one_drive_keep_apart_whatever_is_looked_through(arm):
-    """Something slow that is no wave, far above the noise: many waves stand for it, none of them twice."""
+    """Something slow that is no wave, far above the noise: many waves represent it, none of them twice."""
     _, basis, effect, drive = arm
     slow = np.tanh(3.0 * drive) * np.abs(drive) * 1e-3
     data = np.einsum("nak,nk->na", effect, slow).ravel() + NOISE_MM * np.random.default_rng(0).normal(size=len(basis))
@@ -130,7 +130,7 @@ def test_a_drive_that_stands_still_hides_no_wave_of_another(arm):
 
 def test_the_spectrum_that_made_the_data_is_the_likeliest():
     """Coefficients drawn from each spectrum, unlike sizes, in noise: most draws name it and its size."""
-    law = find("drive_error_function", arms.ARM)
+    effect = find("drive_error_function", arms.ARM)
     case = arms.case_of(arms.measure(count=300), "drive_error_function")
     linear = case.linearise(calibrate(case))
     basis, _ = np.linalg.qr(linear.base.reshape(linear.data.size, -1))
@@ -138,7 +138,7 @@ def test_the_spectrum_that_made_the_data_is_the_likeliest():
     # low orders of two drives do, and are quick
     keep = np.concatenate([np.arange(2 * 48), 128 + np.arange(2 * 48)])
     columns = whole[:, keep] - basis @ (basis.T @ whole[:, keep])
-    spectra, hits, draws = [one[keep] for one in law.coordinates.spectra], 0, 0
+    spectra, hits, draws = [one[keep] for one in effect.coordinates.spectra], 0, 0
     for number, size in enumerate(spectra):
         for seed in range(4):
             generator = np.random.default_rng([number, seed])
@@ -154,9 +154,9 @@ def test_the_spectrum_that_made_the_data_is_the_likeliest():
 
 def test_an_injected_wave_has_its_amplitude():
     """In exact readings with noise, the arm calibrated: one wave on each of two drives, and nothing elsewhere."""
-    law = find("transmission_orders", arms.ARM).with_waves(((1, 11.0), (3, 30.0)))
+    effect = find("transmission_orders", arms.ARM).with_waves(((1, 11.0), (3, 30.0)))
     sine, cosine = np.array([2.4e-4, -5e-4]), np.array([-1e-4, 3e-4])
-    acting = arms.active("", np.stack([sine, cosine], axis=1).ravel(), {}, law)
+    acting = arms.active("", np.stack([sine, cosine], axis=1).ravel(), {}, effect)
     case = arms.case_of(arms.measure((acting,)))
     state = calibrate(case)
     for k, (drive, order) in enumerate(((1, 11.0), (3, 30.0))):
@@ -169,9 +169,9 @@ def test_an_injected_wave_has_its_amplitude():
 
 
 def test_amplitudes_are_exact_where_nothing_else_acts():
-    """Without noise, of a small wave: the calibration fitted beside it changes nothing of it."""
-    law = find("transmission_orders", arms.ARM).with_waves(((2, 4.5),))
-    acting = arms.active("", [3e-5, -4e-5], {}, law)
+    """Without noise, of a small wave: the calibration fitted with it does not change it."""
+    effect = find("transmission_orders", arms.ARM).with_waves(((2, 4.5),))
+    acting = arms.active("", [3e-5, -4e-5], {}, effect)
     case = arms.case_of(arms.measure((acting,), noise=(0.0, 0.0)))
     found = amplitudes(case, calibrate(case), np.array([4.5]))[2]
     np.testing.assert_allclose(found, 5e-5, rtol=2e-3)

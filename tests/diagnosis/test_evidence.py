@@ -35,18 +35,16 @@ LIBRARY = {"free": _effect([0.3, 2.0], [0, 0], False), "legged": _effect([1.0, 1
 PULLS = {"pull": _effect([1.0], [0], True), "pair": _effect([1.0, 1.0], [0, 0], True)}
 
 
-def _evidence(seed=0, with_law=False):
-    """Evidence on random numbers: three calibration columns, two effects, one of them with two columns of its law's
-    doubt.
-    """
+def _evidence(seed=0, with_shapes=False):
+    """Evidence on random numbers: three calibration columns, two effects, one with two columns of its shape."""
     generator = np.random.default_rng(seed)
     shape = (len(RUN), 3)
     columns = {("free", 0): generator.normal(size=(*shape, 2)), ("legged", 0): generator.normal(size=(*shape, 3))}
-    laws = {"free": 0.03 * generator.normal(size=(*shape, 2))} if with_law else {}
+    shape_columns = {"free": 0.03 * generator.normal(size=(*shape, 2))} if with_shapes else {}
     base = generator.normal(size=(*shape, 3)) * [1.0, 30.0, 500.0]
     data = 0.2 * generator.normal(size=shape)
     return ModelEvidence(
-        LIBRARY, LinearizedProblem(data, base, columns, laws, {}, None), RUN, NoiseModel.white(NOISE_MM)
+        LIBRARY, LinearizedProblem(data, base, columns, shape_columns, {}, None), RUN, NoiseModel.white(NOISE_MM)
     )
 
 
@@ -105,10 +103,10 @@ def test_scores_equal_a_dense_marginal_likelihood(level, legs):
 
 
 @pytest.mark.parametrize("level", [0, 3, 6])
-def test_two_terms_and_a_laws_doubt_equal_a_dense_marginal_likelihood(level):
-    evidence = _evidence(seed=1, with_law=True)
+def test_two_terms_and_shape_parameters_equal_a_dense_marginal_likelihood(level):
+    evidence = _evidence(seed=1, with_shapes=True)
     linear = evidence.linear
-    free, legged, law = (
+    free, legged, shape = (
         linear.columns["free", 0].reshape(-1, 2),
         linear.columns["legged", 0].reshape(-1, 3),
         linear.shape_columns["free"].reshape(-1, 2),
@@ -117,7 +115,7 @@ def test_two_terms_and_a_laws_doubt_equal_a_dense_marginal_likelihood(level):
         _unit_size(evidence, free, LIBRARY["free"].coordinates.typical),
         _unit_size(evidence, legged, np.array([1.0, 1.0, 1.5])),
     )
-    together = np.concatenate([free, legged, law], axis=1)
+    together = np.concatenate([free, legged, shape], axis=1)
     expected = []
     for first, second in product(PRIOR_SCALES, PRIOR_SCALES):
         prior = np.concatenate([first * sizes[0], second * sizes[1], np.ones(2)])
@@ -261,11 +259,11 @@ def test_the_coefficients_mean_keeps_positive_ones_positive_and_is_optimal_there
     assert 0.5 * mean @ precision @ mean - mean @ moment[0] <= cost.min() + 1e-6 * abs(cost.min())
 
 
-def test_no_strength_makes_a_prior_wider_than_its_law_allows():
-    """A coefficient that the calibration nearly takes up would else be believed to be metres."""
+def test_no_prior_scale_makes_a_prior_wider_than_its_effect_allows():
+    """A coefficient that the calibration nearly absorbs would else have an estimate of metres."""
     free = _evidence()
-    law = free.library["free"].coordinates
-    narrow = SimpleNamespace(coordinates=replace(law, most=np.array([1e-3, 2e-3])))
+    shape = free.library["free"].coordinates
+    narrow = SimpleNamespace(coordinates=replace(shape, most=np.array([1e-3, 2e-3])))
     bounded = replace(free, library=free.library | {"free": narrow})
     term = (EffectTerm("free"),)
     assert (bounded.scales(term, [300.0]) <= [1e-3, 2e-3]).all() and (free.scales(term, [300.0]) > 1.0).all()

@@ -26,7 +26,7 @@ def _off(numbers, errors, name, true):
 
 
 def test_play_of_a_drive_that_holds_along_two_sides_of_a_rectangle_is_found():
-    found, numbers, errors = _diagnosed(campaign(play_mm=(0.08, 0.0, 0.0)))
+    found, numbers, errors = _diagnosed(campaign(backlash_mm=(0.08, 0.0, 0.0)))
     assert found.verdict["effects"] == "backlash" and found.verdict["leg"] == 1
     assert _off(numbers, errors, "width1", 0.08) < 3.0 and errors["width1"] < 0.002
 
@@ -47,14 +47,14 @@ def test_a_screw_that_grows_from_its_middle_is_found_with_its_time_constant():
     assert numbers["time_constant"] == pytest.approx(700.0, rel=0.15)
 
 
-def test_rivals_that_need_times_are_told_apart_by_poses_that_have_times():
-    """A campaign with times and without a column of speeds: poses are planned at the speed that the times tell."""
+def test_rivals_that_need_times_are_separated_by_poses_that_have_times():
+    """A campaign with times and without a column of speeds: poses are planned at the speed by the times."""
 
     def grown(way, time):
         return np.array([6e-6 * way[0], 0.0, 0.0]) * (1.0 - np.exp(-time / 1000.0))
 
     frame = campaign(grown=grown, seed=6).iloc[::2].reset_index(drop=True)
-    # these are told apart by a run
+    # these are separated by a run
     found, *_ = _diagnosed(frame, without=("base_drift", "tracker_scale", "friction_windup"))
     best, listed = found.tables["gap_next_runs"].iloc[0], found.tables["gap_next_poses"]
     assert best["kind"] == "poses" and "screw_growth" in best["separates"] and len(listed) > 1

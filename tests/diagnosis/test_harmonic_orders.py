@@ -56,7 +56,7 @@ def test_a_ratio_that_nobody_states_is_found(ratio, seed):
     assert abs(found - ratio) < 0.15 * resolution(case.motion.drive[case.used])
 
 
-def test_a_ratio_is_found_beside_another_effect():
+def test_a_ratio_is_found_together_with_another_effect():
     result = diagnosed(measure((_geared(12.0, 5, 8e-4), strong("frame_misregistration", 10.0))))
     assert set(result.verdict["effects"].split("+")) == {"transmission_error", "frame_misregistration"}
 

@@ -24,8 +24,8 @@ from tests.diagnosis.campaigns import (
     FORWARD,
     FULL,
     LINES,
+    MODEL,
     NOISE_MM,
-    SIM,
     SPIRAL,
     case_of,
     diagnosed,
@@ -183,14 +183,14 @@ def test_the_noise_is_found_within_its_error_whatever_smooth_gap_there_is(name):
     assert np.sqrt((estimated.noise.axis_mm**2).mean()) == pytest.approx(NOISE_MM, rel=4.0 / np.sqrt(6.0 * upper))
 
 
-def test_a_campaigns_own_noise_is_told_by_the_same_rule():
+def test_a_campaigns_own_noise_is_found_by_the_same_rule():
     frame = measure((strong("leg_asymmetry", 6.0),))
-    given = campaign_noise(SIM, frame, (0.5, None))
+    given = campaign_noise(MODEL, frame, (0.5, None))
     assert (given.mm, given.source) == (0.5, "given") and np.isnan(given.rad)
-    found = campaign_noise(SIM, frame, (None, None))
+    found = campaign_noise(MODEL, frame, (None, None))
     assert found.source == "high_frequency" and found.mm == pytest.approx(NOISE_MM, rel=0.15)
     with pytest.raises(ConfigError, match="too few"):
-        campaign_noise(SIM, frame.head(2), (None, None))
+        campaign_noise(MODEL, frame.head(2), (None, None))
 
 
 def test_repeats_give_the_noise_where_they_are_clearly_quieter():

@@ -17,7 +17,7 @@ _SETS = (
 
 
 @pytest.mark.parametrize("names", _SETS, ids=[" ".join(names) for names in _SETS])
-def test_the_average_over_each_strength_is_near_that_over_all_combinations(names):
+def test_the_average_over_each_prior_scale_is_near_that_over_all_combinations(names):
     evidence, terms = tripod_evidence(), tuple(map(EffectTerm, names))
     found, _ = evidence.over_all_strengths(terms, 0)
     value, _ = evidence.over_strengths(terms, levels=[0])

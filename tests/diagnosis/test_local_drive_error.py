@@ -34,7 +34,7 @@ def _error(lengths):
 @pytest.fixture(scope="module")
 def measured():
     """The robot and its measurement table: the pose whose legs are as long as the encoders mean, and noise."""
-    generator, told = np.random.default_rng(1), []
+    generator, readings = np.random.default_rng(1), []
     for _ in range(_COUNT):
         position = np.array([0.0, 0.0, _HEIGHT]) + generator.uniform(-1.0, 1.0, 3) * [40.0, 40.0, 30.0]
         vector = generator.uniform(-0.12, 0.12, 3)
@@ -46,8 +46,8 @@ def measured():
 
         pose = fsolve(off, np.r_[position, vector], xtol=1e-10)
         turned = Rotation.from_rotvec(_NOISE_RAD * generator.standard_normal(3)) * Rotation.from_rotvec(pose[3:])
-        told.append((command, position, pose[:3] + _NOISE_MM * generator.standard_normal(3), turned.as_matrix()))
-    drive, position, reached, turn = map(np.array, zip(*told, strict=True))
+        readings.append((command, position, pose[:3] + _NOISE_MM * generator.standard_normal(3), turned.as_matrix()))
+    drive, position, reached, turn = map(np.array, zip(*readings, strict=True))
     robot = hexapod(_BASE, _PLATFORM, _HEIGHT, 80.0, parameter_set="full")
     frame = pd.DataFrame({"run": 1, "trajectory": "poses", "point": np.arange(1, _COUNT + 1), "status": "ok"})
     frame = frame.assign(
@@ -67,10 +67,10 @@ def test_a_local_error_of_one_encoder_is_its_error_function(measured):
     assert found.verdict["effects"] == "drive_error_function" and found.verdict["probability"] > 0.9
     assert found.verdict["leg"] == _LEG + 1
     assert found.verdict["gap_after_rms_mm"] < 0.4 * found.verdict["gap_rms_mm"]
-    # the function of that drive is the hill, up to a constant and a slope, which a length and others stand for
+    # the function of that drive is the hill, up to a constant and a slope, which a length and others absorb
     case, state = found.inference.case, found.state
-    law, values = case.library["drive_error_function"], state.effects["drive_error_function", 0]
-    made = [f @ own for f, own in zip(law.along_drives(case.motion), np.reshape(values, (6, -1)), strict=True)]
+    effect, values = case.library["drive_error_function"], state.effects["drive_error_function", 0]
+    made = [f @ own for f, own in zip(effect.along_drives(case.motion), np.reshape(values, (6, -1)), strict=True)]
     lengths = frame[robot.parts.columns[_LEG]].to_numpy()
     line = np.stack([np.ones(_COUNT), lengths], axis=1)
 

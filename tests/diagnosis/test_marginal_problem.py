@@ -16,7 +16,7 @@ GRIDS = [0.3, 10.0, 100.0], [1.0, 30.0], [3.0, 300.0]
 
 
 def _problem(generator, size, positive, alike):
-    """Least squares of rows, and the MarginalProblem of them; the columns are alike but for a share of
+    """Least squares of rows, and the MarginalProblem of them; the columns are alike except for a share of
     10^-alike.
     """
     design = generator.normal(size=(3 * size, 1)) + 10.0**-alike * generator.normal(size=(3 * size, size))
@@ -68,16 +68,16 @@ def coefficients_of(evidence, terms, order):
 
 
 def test_the_order_of_the_terms_makes_no_difference():
-    """Neither to what is made anew nor to what is kept from another order."""
+    """Neither to a new result nor to one cached from another order."""
     terms = EffectTerm("free"), EffectTerm("legged")
-    evidence = _evidence(seed=3, with_law=True)
+    evidence = _evidence(seed=3, with_shapes=True)
     linear = evidence.linear
     nuisance_sd = {"free": linear.shape_columns["free"], "legged": linear.shape_columns["free"][..., :1]}
     evidence = replace(evidence, linear=replace(linear, shape_columns=nuisance_sd))
-    kept = asked(evidence, terms, GRIDS)
-    the_same(kept)
+    cached = asked(evidence, terms, GRIDS)
+    the_same(cached)
     fresh = ModelEvidence(LIBRARY, evidence.linear, evidence.run, evidence.noise)
     anew, _ = fresh.over_strengths(terms[::-1], GRIDS[1::-1], [0])
-    np.testing.assert_allclose(anew.reshape(2, 3).T, kept[0, 1], rtol=1e-9)
+    np.testing.assert_allclose(anew.reshape(2, 3).T, cached[0, 1], rtol=1e-9)
     for one, other in zip(*(coefficients_of(evidence, terms, order) for order in ((0, 1), (1, 0))), strict=True):
         np.testing.assert_allclose(one, other, rtol=1e-7)

@@ -47,7 +47,7 @@ def _count(case, term):
     ids=lambda terms: "+".join(t.effect for t in terms),
 )
 def test_derivatives_are_those_of_the_exact_model(terms):
-    """By geometry, coefficients, shape parameters and what the weight may be off by, about a corrected state."""
+    """By geometry, coefficients, shape parameters, payload and tilt, about a corrected state."""
     case = _case(*(term.effect for term in terms))
     model = _model(case, *terms)
     parameters = model.parameters
@@ -135,7 +135,7 @@ def test_fitted_shape_parameters_have_errors():
 
 
 def test_named_effects_keep_their_sign_free():
-    """A size that contradicts the law shows: a compliance of the wrong sign is not cut off at zero."""
+    """A size that contradicts the effect model shows: a compliance of the wrong sign is not cut off at zero."""
     frame = arms.measure((arms.active("drive_compliance", np.full(arms.DRIVES, 2e-8)),), count=80)
     case = arms.case_of(frame, "drive_compliance")
     wrong = replace(case, motion=replace(case.motion, drive_load=-case.motion.drive_load))

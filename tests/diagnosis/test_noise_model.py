@@ -55,7 +55,7 @@ def _columns(generator, count=60):
 def test_the_numbers_are_recovered_from_what_smooth_columns_leave(axis_mm, correlation, stated):
     """With effects in the data that the columns hold: sizes within 4 standard errors, no bias from what was fitted."""
     if stated is None and correlation:
-        pytest.skip("correlated noise that nobody has stated is limited to what its roughest part shows")
+        pytest.skip("correlated noise that is not stated is limited to what its roughest part shows")
     found = []
     for seed in range(6):
         generator = np.random.default_rng(seed)
@@ -78,7 +78,7 @@ def test_what_is_smooth_and_larger_than_the_stated_noise_is_none():
 
 
 @pytest.mark.parametrize("size", [1.0, 2.0, 3.0])
-def test_a_smooth_discrepancy_beside_the_noise_is_no_part_of_it(size):
+def test_a_smooth_discrepancy_is_no_part_of_the_noise(size):
     """Where a model lacks something smooth the noise is found as it is, not as large as both together."""
     wave = half_waves(_SERIES)
     found = []

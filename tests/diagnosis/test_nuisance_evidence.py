@@ -87,7 +87,7 @@ def test_the_linearisation_is_a_quarter_of_a_nat_off_where_the_effect_acts(robot
     grids = PRIOR_SCALES, *([1.0],) * (len(terms) - 1)
     found, grid = evidence.over_strengths(terms, grids, [0])
     grams = partial(evidence._grams, [0])
-    parts = evidence._bare(terms, grams), evidence._blocks(terms), evidence.linear.weight_steps, grams
+    parts = evidence._without_nuisance(terms, grams), evidence._blocks(terms), evidence.linear.weight_steps, grams
     sampled = [sample_evidence(ProductModel.make(*parts, row), np.random.default_rng(2)) for row in grid]
     exact, error, _ = np.transpose(sampled)
     averaged = logsumexp(found[0] - evidence.none[0])

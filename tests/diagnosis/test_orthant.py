@@ -18,7 +18,7 @@ _MAX_ERROR_NATS = 0.1
 
 
 def _normal(generator, count, alike):
-    """Posterior of non-negative coefficients whose columns are alike or opposite but for a share 10^-alike."""
+    """Posterior of non-negative coefficients whose columns are alike or opposite except for a share 10^-alike."""
     sign = generator.choice([-1.0, 1.0], count) if generator.random() < 0.5 else np.ones(count)
     design = generator.normal(size=(3 * count, 1)) * sign + 10.0**-alike * generator.normal(size=(3 * count, count))
     scale = 10.0 ** generator.uniform(-1.0, 1.5, count)
@@ -83,7 +83,7 @@ def test_strong_correlations_are_within_a_tenth_of_a_nat(count, alike):
         found, correction = log_evidence_and_correction(gram[None], moment[None], scale[None], positive)
         error = abs(found[0, 0] - sampled.log)
         assert sampled.error < 0.02 and error < _MAX_ERROR_NATS
-        # the correction's size is that of the error at most, but for what is below a hundredth of a nat
+        # the correction's size is that of the error at most, except for what is below a hundredth of a nat
         assert error < abs(correction[0, 0]) + 0.01 + 4.0 * sampled.error
 
 

@@ -1,4 +1,4 @@
-"""A load that nobody told of and a base that leans: what gives way is named, its numbers hold, and the user is told."""
+"""An unstated mass and a tilted base: the compliance is named, its parameters hold, and notes say what is off."""
 
 from dataclasses import replace
 from itertools import permutations
@@ -11,7 +11,7 @@ import yaml
 
 from rrru.diagnosis.design.expected_information import worth
 from rrru.diagnosis.diagnose import MeasuredRobot, diagnose
-from rrru.diagnosis.payload_nuisance import doubts_of
+from rrru.diagnosis.payload_nuisance import nuisance_priors
 from rrru.diagnosis.settings import GapSettings, check
 from rrru.diagnosis.terms import EffectTerm
 from rrru.diagnosis.whitened import DISCREPANCY_SCALES
@@ -38,20 +38,20 @@ def _found(more, settings=None):
     paths = draw_trajectories(stream(5, "paths"), known)
     robot = FileRobot("a hexapod", _FILE, "own", paths, (0.2, -0.1, 0.3, 0.1, -0.4, 0.2), (fault,))
     measurements = robot.measured(known)
-    told = MeasuredRobot(known.seen(measurements), known.masses, known.noise_mm)
-    result = diagnose(measurements, told, settings or GapSettings(), details=False)
+    robot = MeasuredRobot(known.seen(measurements), known.masses, known.noise_mm)
+    result = diagnose(measurements, robot, settings or GapSettings(), details=False)
     return result.verdict, result.tables["gap_parameters"].set_index(["effect", "parameter"]), result.inference
 
 
 @pytest.fixture(scope="module")
 def misled():
-    """Under a weight that is not as told."""
+    """With payload and tilt that are not as stated."""
     return _found({"load_kg": _OFF["extra_kg"], "tilt_x_rad": _OFF["lean_x"], "tilt_y_rad": _OFF["lean_y"]})
 
 
 @pytest.fixture(scope="module")
-def as_told():
-    """Under a weight that is as told."""
+def as_stated():
+    """With payload and tilt as stated."""
     return _found({})
 
 
@@ -63,7 +63,7 @@ def test_the_campaign_driven_once_more_is_worth_as_much_again(misled):
     assert (sum(runs[1:], now + runs[0])).nats() == pytest.approx(2.0 * now.nats(), rel=1e-3)
 
 
-def test_beside_a_weight_the_order_of_the_terms_makes_no_difference(misled):
+def test_with_payload_and_tilt_the_order_of_the_terms_makes_no_difference(misled):
     *_, inference = misled
     evidence = inference.evidence
     terms = EffectTerm("backlash"), EffectTerm("drive_compliance"), EffectTerm("joint_clearance", 1)
@@ -85,7 +85,7 @@ def test_the_springs_are_named_and_within_their_errors(misled):
     assert (own["standard_error"] < 0.1 * np.array(_SOFT)).sum() >= 4
 
 
-def test_what_the_weight_is_off_by_is_found_and_told(misled):
+def test_errors_of_payload_and_tilt_are_found_and_reported(misled):
     verdict, numbers, _ = misled
     weight = numbers.loc["weight"]
     off = (weight["value"] - list(_OFF.values())) / weight["standard_error"]
@@ -95,24 +95,24 @@ def test_what_the_weight_is_off_by_is_found_and_told(misled):
     assert len(sure) and said == len(sure)
 
 
-def test_a_weight_that_is_as_told_stays_so(as_told):
-    verdict, numbers, _ = as_told
+def test_payload_and_tilt_that_are_as_stated_stay_so(as_stated):
+    verdict, numbers, _ = as_stated
     weight = numbers.loc["weight"]
-    assert verdict["effects"] == "drive_compliance" and "weight not" not in verdict["notes"]
+    assert verdict["effects"] == "drive_compliance" and "tilted" not in verdict["notes"]
     assert (weight["value"].abs() < 3.0 * weight["standard_error"]).all()
 
 
-def test_a_weight_that_is_known_is_not_fitted(as_told):
+def test_known_payload_and_tilt_are_not_fitted(as_stated):
     known = dict.fromkeys(_OFF, 0.0)
     verdict, numbers, _ = _found({}, GapSettings(known={"weight": known}))
     assert verdict["effects"] == "drive_compliance" and "weight" not in numbers.index.get_level_values("effect")
-    _, free, _ = as_told
+    _, free, _ = as_stated
     sizes = [one.loc["drive_compliance", "standard_error"] for one in (numbers, free)]
     assert (sizes[0] < sizes[1]).all()
 
 
-@pytest.mark.parametrize("wrong", [{"lean": 0.0}, {"extra_kg": 1.0}], ids=["no such number", "not as told"])
-def test_of_the_weight_only_that_it_is_as_told_can_be_known(wrong):
+@pytest.mark.parametrize("wrong", [{"lean": 0.0}, {"extra_kg": 1.0}], ids=["no such number", "not as stated"])
+def test_payload_and_tilt_can_be_known_only_as_stated(wrong):
     with pytest.raises(ConfigError, match=r"gap\.known: weight"):
         GapSettings(known={"weight": wrong}).library(conditions(_FILE).mechanism)
 
@@ -126,29 +126,31 @@ def test_leans_about_all_axes_may_be_known_for_robots_of_one_configuration_stand
 
 def test_a_weight_may_lean_either_way_and_no_platform_is_lighter_than_nothing():
     masses = Masses(platform_kg=3.0, arm_kg=1.0, forearm_kg=0.0)
-    nuisance_sd, bounds = doubts_of(SimpleNamespace(robot=ROBOT, payload_kg=np.array([0.0, 20.0, np.nan])), masses)
+    nuisance_sd, bounds = nuisance_priors(
+        SimpleNamespace(robot=ROBOT, payload_kg=np.array([0.0, 20.0, np.nan])), masses
+    )
     assert nuisance_sd["extra_kg"] == pytest.approx(0.3 * 23.0) and -3.0 < bounds["extra_kg"][0] < -2.0
     assert all(bounds[lean][0] == -bounds[lean][1] for lean in ("lean_x", "lean_y"))
-    nothing, _ = doubts_of(SimpleNamespace(robot=ROBOT, payload_kg=np.zeros(1)), Masses(0.0, 0.0, 0.0))
+    nothing, _ = nuisance_priors(SimpleNamespace(robot=ROBOT, payload_kg=np.zeros(1)), Masses(0.0, 0.0, 0.0))
     assert not any(nothing.values())
 
 
-def test_an_arm_that_was_told_no_tool_may_carry_one():
+def test_an_arm_without_a_stated_tool_may_carry_one():
     arm = conditions("arm6_file").mechanism
     arm = replace(
         arm, point_masses=tuple(point_mass for point_mass in arm.point_masses if point_mass.joint != PLATFORM)
     )
-    nuisance_sd, _ = doubts_of(SimpleNamespace(robot=arm, payload_kg=np.zeros(1)), Masses(0.0, 0.0, 0.0))
+    nuisance_sd, _ = nuisance_priors(SimpleNamespace(robot=arm, payload_kg=np.zeros(1)), Masses(0.0, 0.0, 0.0))
     assert (
         nuisance_sd["extra_kg"] == pytest.approx(0.1 * sum(point_mass.mass_kg for point_mass in arm.point_masses))
         and nuisance_sd["lean_x"] > 0.0
     )
 
 
-def test_where_a_joint_is_loose_the_weight_is_not_found():
+def test_where_a_joint_is_loose_payload_and_tilt_are_not_fitted():
     loose = active("joint_clearance", [0.3, 0.25, 0.35])
     assert bears_load(loose.effect) and not gives_way(loose.effect)
     measurements = measure((loose,), seed=3)
     result = diagnose(measurements, MeasuredRobot(ROBOT, Masses(3.0, 1.0, 0.5), 0.02), GapSettings(), details=False)
     assert result.verdict["effects"] == "joint_clearance" and not result.inference.state.weight
-    assert "weight not" not in result.verdict["notes"]
+    assert "tilted" not in result.verdict["notes"]

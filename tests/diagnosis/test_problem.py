@@ -1,4 +1,4 @@
-"""The campaign as the diagnosis sees it: its motion, its exact corrected sim and its signatures, by independent
+"""The campaign as the diagnosis sees it: its motion, its exact corrected model and its signatures, by independent
 routes.
 """
 
@@ -13,7 +13,7 @@ from rrru.diagnosis.calibrate import calibrate
 from rrru.diagnosis.state import State
 from rrru.errors import FitError
 from tests.diagnosis import campaigns
-from tests.diagnosis.campaigns import EFFECTS, ROBOT, SIM, active, case_of, drawn, measure, plan_of, robot_of
+from tests.diagnosis.campaigns import EFFECTS, MODEL, ROBOT, active, case_of, drawn, measure, plan_of, robot_of
 
 STATE_ERRORS = np.array([2e-3, -1e-3, 1.5e-3, 0.4, -0.3, 0.5, 0.2])
 
@@ -80,7 +80,7 @@ def _state(name, shape, seed=3, size=1.0):
 
 @pytest.mark.parametrize("name", EFFECTS)
 def test_the_corrected_sim_is_the_virtual_robot_with_the_same_numbers(case, name):
-    """On the same motion to the solver's accuracy, on the motion as driven up to what the columns do not tell of it."""
+    """On the same motion to the solver's accuracy, on the motion as driven up to what the columns do not determine."""
     shape = len(EFFECTS[name].coordinates.shapes) - 1
     state = _state(name, shape)
     robot = robot_of((active(name, state.effects[name, shape], shape),))
@@ -88,12 +88,14 @@ def test_the_corrected_sim_is_the_virtual_robot_with_the_same_numbers(case, name
     same, _ = robot.positions(case.motion, rows.command(case.measurements))
     np.testing.assert_allclose(found, same[case.used], atol=1e-7)
     driven, _ = robot.positions(robot.motion(plan_of(), ROBOT.inverse), plan_of().targets())
-    size = np.sqrt(((found - case.sim(STATE_ERRORS)[case.used]) ** 2).mean())
+    size = np.sqrt(((found - case.model_positions(STATE_ERRORS)[case.used]) ** 2).mean())
     assert size > 0.0 and np.median(np.abs(found - driven[case.used])) < 0.03 * size
 
 
 def test_without_effects_the_corrected_sim_is_the_calibrated_one(case):
-    np.testing.assert_allclose(_exact(case, State(STATE_ERRORS, {})), case.sim(STATE_ERRORS)[case.used], atol=1e-7)
+    np.testing.assert_allclose(
+        _exact(case, State(STATE_ERRORS, {})), case.model_positions(STATE_ERRORS)[case.used], atol=1e-7
+    )
 
 
 @pytest.mark.parametrize("name", EFFECTS)
@@ -116,19 +118,23 @@ def test_the_calibrations_columns_are_derivatives_of_the_sim(case):
     base = case.linearise(State(STATE_ERRORS, {})).base
     for k, step in enumerate([1e-5] * 3 + [1e-2] * 4):
         change = np.eye(7)[k] * step
-        slope = (case.sim(STATE_ERRORS + change) - case.sim(STATE_ERRORS - change))[case.used] / (2.0 * step)
+        slope = (case.model_positions(STATE_ERRORS + change) - case.model_positions(STATE_ERRORS - change))[
+            case.used
+        ] / (2.0 * step)
         np.testing.assert_allclose(base[..., k], slope, atol=1e-5 * max(np.abs(slope).max(), 1.0))
 
 
 def test_the_derivative_by_the_drives_is_the_mechanisms(case):
     linear = case.linearise(State(STATE_ERRORS, {}))
-    theta, position = rows.actuators(case.measurements, SIM), case.sim(STATE_ERRORS)
-    np.testing.assert_allclose(linear.drive, SIM.actuator_jacobian(position, theta, STATE_ERRORS)[case.used], rtol=1e-8)
+    theta, position = rows.actuators(case.measurements, MODEL), case.model_positions(STATE_ERRORS)
+    np.testing.assert_allclose(
+        linear.drive, MODEL.actuator_jacobian(position, theta, STATE_ERRORS)[case.used], rtol=1e-8
+    )
 
 
 @pytest.mark.parametrize("name", ["servo_lag", "leg_asymmetry", "joint_clearance", "thermal_growth"])
 def test_the_data_about_a_state_are_what_it_leaves_and_what_it_explains(case, name):
-    """So that the state's own coordinates give back the exact sim's residual."""
+    """So that the state's own coordinates give back the exact model's residual."""
     state = _state(name, 1 if len(EFFECTS[name].coordinates.shapes) > 1 else 0, size=4.0)
     linear = case.linearise(state)
     (key, coordinates), *_ = state.effects.items()

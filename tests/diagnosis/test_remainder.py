@@ -102,7 +102,7 @@ def test_the_evidence_is_that_of_the_dense_normal_density():
 
 
 def test_effects_that_make_what_the_variable_makes_are_found():
-    """A slow drift follows the time as the remainder does; waves of a drive do not, nor does a law of other needs."""
+    """A slow drift follows the time as the remainder does; waves of a drive and effects of other needs do not."""
     found = _attribution(_MADE["the time"], 1)
     motion = found.case.motion
     made = {

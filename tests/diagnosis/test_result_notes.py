@@ -1,4 +1,4 @@
-"""Sentences on zeros and on the weight: written where the readings determine these, and true there."""
+"""Sentences on zeros, payload and tilt: written where the readings determine these, and true there."""
 
 import re
 from dataclasses import replace
@@ -14,7 +14,7 @@ from rrru.diagnosis.calibrate import calibrate
 from rrru.diagnosis.diagnose import sim
 from rrru.diagnosis.make_problem import make_case
 from rrru.diagnosis.model_fit import fit_model
-from rrru.diagnosis.result_notes import weight_doubts, weight_notes, zero_notes
+from rrru.diagnosis.result_notes import payload_notes, undetermined_payload_notes, zero_notes
 from rrru.diagnosis.terms import EffectTerm
 from rrru.kinematics.dynamics import Masses
 from rrru.robots.serial import serial
@@ -49,8 +49,8 @@ def _measured(robot, errors, generator, place_mm=None, known=True):
         seen = poses.point(np.asarray(place_mm))
         frame = frame.assign(target="ball", **rows.vector_columns("target", np.tile(place_mm, (90, 1))))
     seen = seen + _NOISE_MM * generator.standard_normal(seen.shape)
-    told = dict(zip(robot.parts.columns, driven.T, strict=True))
-    frame = frame.assign(**told, **rows.vector_columns("command", command), **rows.vector_columns("measured", seen))
+    drives = dict(zip(robot.parts.columns, driven.T, strict=True))
+    frame = frame.assign(**drives, **rows.vector_columns("command", command), **rows.vector_columns("measured", seen))
     robot = robot.reading(rows.reads(frame, () if known is False else ("ball",)))
     robot = robot.seen_at(driven, command, rows.readings(frame, robot.angle_arm_mm))
     return make_case(frame, sim(robot), Masses(0.0, 0.0, 0.0), _NOISE_MM, {})
@@ -85,8 +85,8 @@ def test_a_sentence_on_a_zero_is_true(seed):
 
 
 @pytest.mark.parametrize("known", [True, False])
-def test_the_zero_of_the_last_joint_is_not_told_from_the_place_of_a_target(known):
-    """The target lies 3 mm beside its stated place, or nobody knows where; the joint's own zero is right."""
+def test_the_zero_of_the_last_joint_is_confounded_with_the_place_of_a_target(known):
+    """The target is 3 mm off its stated place, or its place is unknown; the joint's own zero is right."""
     generator = np.random.default_rng(8)
     robot = _arm(generator)
     place, off = np.array([70.0, -30.0, 60.0]), Rotation.from_rotvec([0.0, 0.0, 0.05]).as_matrix()
@@ -99,8 +99,8 @@ def test_the_zero_of_the_last_joint_is_not_told_from_the_place_of_a_target(known
     assert _ZERO.match(third)
 
 
-def test_a_zero_that_a_link_imitates_is_said_to_be_most_probable_only():
-    """As where poses hardly tell a zero from a shift of the next joint, which the prior holds to 10 mm."""
+def test_a_zero_confounded_with_a_link_is_said_to_be_most_probable_only():
+    """As where poses hardly separate a zero from a shift of the next joint, which the prior holds to 10 mm."""
     generator = np.random.default_rng(3)
     robot = _arm(generator)
     case = _measured(robot, {"dq3": 0.2}, generator)
@@ -114,35 +114,35 @@ def test_a_zero_that_a_link_imitates_is_said_to_be_most_probable_only():
     assert "zero is not determined by the readings, its most probable offset is 11.5 degrees (95 %: 9.2" in note
 
 
-def _weighed(passes, told_kg):
-    """Numbers of the weight, notes and nuisance_sd on it, of a soft robot whose platform is told to weigh so much."""
+def _weighed(passes, stated_kg):
+    """Errors of payload and tilt, and both kinds of notes, of a soft robot with a stated mass of its platform."""
     name = "drive_compliance"
     library = {name: campaigns.EFFECTS[name]}
     frame = campaigns.measure((campaigns.strong(name, 30.0),), plan=campaigns.plan_of(passes))
-    masses = replace(campaigns.MASSES, platform_kg=told_kg)
-    case = make_case(frame, campaigns.SIM, masses, campaigns.NOISE_MM, library)
+    masses = replace(campaigns.MASSES, platform_kg=stated_kg)
+    case = make_case(frame, campaigns.MODEL, masses, campaigns.NOISE_MM, library)
     sizes = 20.0 * np.asarray(library[name].coordinates.typical)
     fit = fit_model(case, [calibrate(case)], [EffectTerm(name)], sizes)
     found = SimpleNamespace(case=case, fit=fit)
-    return fit.weight, list(weight_notes(found)), list(weight_doubts(found))
+    return fit.weight, list(payload_notes(found)), list(undetermined_payload_notes(found))
 
 
 _PLATFORM_KG = campaigns.MASSES.platform_kg
 
 
 @pytest.mark.parametrize("passes", [(campaigns.FORWARD, campaigns.REVERSE), (campaigns.FORWARD, campaigns.LOADED)])
-def test_of_a_weight_that_is_as_told_nothing_is_said(passes):
-    weight, notes, nuisance_sd = _weighed(passes, _PLATFORM_KG)
-    assert weight and not notes and not nuisance_sd
+def test_of_a_payload_as_stated_nothing_is_said(passes):
+    weight, notes, undetermined = _weighed(passes, _PLATFORM_KG)
+    assert weight and not notes and not undetermined
 
 
-def test_a_mass_that_nobody_told_is_said_where_two_loads_were_driven():
-    _, (note,), nuisance_sd = _weighed((campaigns.FORWARD, campaigns.LOADED), 0.5 * _PLATFORM_KG)
+def test_a_mass_that_is_not_stated_is_said_where_two_loads_were_driven():
+    _, (note,), undetermined = _weighed((campaigns.FORWARD, campaigns.LOADED), 0.5 * _PLATFORM_KG)
     low, high = map(float, re.search(r"\(95 %: (\S+) to (\S+)\) more than stated", note).groups())
-    assert low < 0.5 * _PLATFORM_KG < high < 1.2 * low and not nuisance_sd
+    assert low < 0.5 * _PLATFORM_KG < high < 1.2 * low and not undetermined
 
 
-def test_with_one_load_a_mass_and_a_compliance_are_not_told_apart():
-    weight, notes, (doubt,) = _weighed((campaigns.FORWARD, campaigns.REVERSE), 0.5 * _PLATFORM_KG)
+def test_with_one_load_a_mass_and_a_compliance_are_confounded():
+    weight, notes, (note,) = _weighed((campaigns.FORWARD, campaigns.REVERSE), 0.5 * _PLATFORM_KG)
     assert weight[0][2] > 3.0 * weight[0][3]
-    assert not notes and doubt.endswith("are not separately identifiable from these readings: measure with two loads")
+    assert not notes and note.endswith("are not separately identifiable from these readings: measure with two loads")

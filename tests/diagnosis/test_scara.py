@@ -48,7 +48,7 @@ def test_numbers_are_those_of_the_turning_drives(name):
     assert effect.coordinates.legs.tolist() == [1, 1, 2, 2]
 
 
-def test_a_gear_error_of_a_ratio_that_nobody_stated_is_named_beside_a_slide():
+def test_a_gear_error_of_a_ratio_that_is_not_stated_is_named_together_with_a_slide():
     true = {"amplitude1": 2.5e-4, "amplitude2": 4e-4, "phase1": 0.4, "phase2": -2.0, "ratio": 31.0}
     frame, known = _campaign({"transmission_error": true})
     effects = ("backlash", "encoder_eccentricity", "transmission_error", "drive_compliance", "thermal_growth")
@@ -61,8 +61,8 @@ def test_a_gear_error_of_a_ratio_that_nobody_stated_is_named_beside_a_slide():
     assert not {"amplitude3", "phase3"} & set(numbers.index)
     # a slide has no such error
     motion = found.inference.case.motion
-    law, robot = find("transmission_error", known.mechanism), known.mechanism
-    change = law.contribute(motion, law.parameters.vector(true))
+    effect, robot = find("transmission_error", known.mechanism), known.mechanism
+    change = effect.contribute(motion, effect.parameters.vector(true))
     turned = robot.drive_errors(np.broadcast_to(change.twists, (len(motion), *change.twists.shape[1:])))
     assert not turned[:, 2].any()
     for k in (0, 1):

@@ -67,7 +67,7 @@ def test_the_search_finds_what_an_enumeration_of_all_sets_finds(acting):
 
 
 @pytest.mark.parametrize("count", [2, 3])
-def test_strengths_averaged_one_by_one_are_near_the_average_over_all_combinations(count):
+def test_prior_scales_averaged_one_by_one_are_near_the_average_over_all_combinations(count):
     case = case_of(measure((strong("servo_lag", 6.0), strong("backlash", 3.0))), _library(*FEW))
     evidence = case.evidence(case.linearise(calibrate(case)))
     terms = tuple(EffectTerm(name) for name in FEW[-count:])
@@ -147,7 +147,7 @@ TWINS = frozenset({"drive_compliance", "own_weight"})
 
 @dataclass(frozen=True)
 class FakeCompliance:
-    """A drive that gives way as `drive_compliance` does, but to the robot's own weight alone."""
+    """A drive with the compliance of `drive_compliance`, but to the robot's own weight alone."""
 
     name: str = "own_weight"
     parameters: ParameterSet = EFFECTS["drive_compliance"].parameters
@@ -167,11 +167,11 @@ def twins():
     """
     case, calibrated = _twins()
     evidence = case.evidence(case.linearise(calibrated))
-    beliefs = explore(evidence, Prior())
+    posterior = explore(evidence, Prior())
     found = InferenceResult(
-        case, calibrated, calibrated, fit_model(case, [calibrated]), evidence, beliefs, *beliefs.best()
+        case, calibrated, calibrated, fit_model(case, [calibrated]), evidence, posterior, *posterior.best()
     )
-    verdict = decide(beliefs, case.library)
+    verdict = decide(posterior, case.library)
     return found, verdict, advise(found, verdict, MASSES).runs
 
 
@@ -192,8 +192,8 @@ def test_what_no_run_tells_apart_shares_the_probability(twins):
 
 
 def test_it_still_does_once_one_of_them_has_been_fitted():
-    beliefs = infer(_twins()[0], Prior()).posterior
-    assert beliefs.marginal("own_weight") == pytest.approx(beliefs.marginal("drive_compliance"), rel=0.1)
+    posterior = infer(_twins()[0], Prior()).posterior
+    assert posterior.marginal("own_weight") == pytest.approx(posterior.marginal("drive_compliance"), rel=0.1)
 
 
 def test_a_payload_is_advised_where_only_a_payload_tells(twins):
@@ -218,9 +218,9 @@ def test_without_the_payload_that_alone_tells_nothing_decides_and_the_limit_is_s
 def test_runs_that_split_a_group_come_before_those_that_tell_more_of_something_else(twins):
     found, verdict, _ = twins
     group = Group(tuple(sorted(TWINS)), 0.99)
-    told = advise(found, replace(verdict, effects=("drive_compliance",), groups=(group,)), MASSES).runs
-    first = told["separates"] == "drive_compliance / own_weight"
-    assert first.iloc[0] and told.loc[first, "gain_nats"].is_monotonic_decreasing
+    runs = advise(found, replace(verdict, effects=("drive_compliance",), groups=(group,)), MASSES).runs
+    first = runs["separates"] == "drive_compliance / own_weight"
+    assert first.iloc[0] and runs.loc[first, "gain_nats"].is_monotonic_decreasing
 
 
 def _columns(library, linear, hypothesis):

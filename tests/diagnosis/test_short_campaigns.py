@@ -1,4 +1,4 @@
-"""Campaigns of few poses: the stated noise counts, and nothing is said of a repeatability that nobody measured."""
+"""Campaigns of few poses: the stated noise counts, and nothing is said of a repeatability that was not measured."""
 
 import numpy as np
 import pytest

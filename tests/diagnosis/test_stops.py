@@ -19,7 +19,7 @@ _PLACES = {"a": (60.0, 10.0, 90.0), "b": (-50.0, 40.0, 120.0), "c": (0.0, -70.0,
 
 
 def _readings(generator, shared_mm, own_mm, targets=3):
-    """Data (m, 3), stop (m,) and kind (m,): what the robot misses at each stop, and each target beside."""
+    """Data (m, 3), stop (m,) and kind (m,): errors of the robot at each stop, and of each target in addition."""
     stop = np.repeat(np.arange(_STOPS), targets)
     own_mm = np.broadcast_to(own_mm, targets)[np.arange(len(stop)) % targets]
     data = shared_mm * generator.standard_normal((_STOPS, 3))[stop]
@@ -146,7 +146,7 @@ def _jumping(seed):
     return size[:, None] * generator.standard_normal((4 * count, 3)), series
 
 
-def test_the_rows_of_a_noisy_target_beside_quiet_ones_are_no_outliers():
+def test_the_rows_of_a_noisy_target_among_quiet_ones_are_no_outliers():
     for seed in range(10):
         residual, series = _jumping(seed)
         assert not isolated(residual, series, 0.0, series).any()
@@ -175,7 +175,7 @@ def test_no_jump_below_the_stated_noise_counts():
 
 
 def test_between_stops_in_no_order_slides_come_from_the_stop_before():
-    """Of a robot whose platform cannot turn, too: no spline through stops tells a way between them."""
+    """Of a robot whose platform cannot turn, too: no spline through stops is the path between them."""
     generator = np.random.default_rng(4)
     low, high = gantry.RANGES_MM.T
     drive = low + (high - low) * generator.random((60, 3))

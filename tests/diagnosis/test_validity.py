@@ -24,7 +24,7 @@ def _of_arm(frame):
     return diagnose(frame, MeasuredRobot(robot, arms.MASSES, arms.NOISE_MM, "arm", arms.NOISE_RAD), _EFFECTS)
 
 
-def _told(found):
+def _answered(found):
     """Facts and card of a diagnosis, accepted by the schemas."""
     for name, frame in ({"gap_verdicts": pd.DataFrame([found.verdict])} | found.tables).items():
         if name != "gap_points":
@@ -35,7 +35,7 @@ def _told(found):
 
 @pytest.fixture(scope="module")
 def turned():
-    """An arm with play, one of whose joints is read with the other sign."""
+    """An arm with backlash, one of whose joints is read with the other sign."""
     frame = arms.measure((arms.active("backlash", np.full(6, 1e-3)),), 80)
     return _of_arm(frame.assign(q3_rad=-frame["q3_rad"]))
 
@@ -44,7 +44,7 @@ def test_of_a_file_that_is_not_the_robot_s_no_cause_is_named(turned):
     verdict = turned.verdict
     assert verdict["effects"] == "unexplained" and not turned.state.effects
     assert "times the noise" in verdict["no_answer"] and "zero is off" not in verdict["notes"]
-    facts, shown = _told(turned)
+    facts, shown = _answered(turned)
     assert (
         shown.lead.startswith("No cause is named: ")
         and verdict["no_answer"] in shown.lead
@@ -58,14 +58,14 @@ def test_of_a_file_that_is_not_the_robot_s_no_cause_is_named(turned):
 def test_numbers_that_bounds_hold_are_the_headline():
     """The zero of a leg is off by more than a calibration looks for."""
     found = campaigns.diagnosed(campaigns.measure(deviations=campaigns.ERRORS | {"dtheta1": 0.302}), details=True)
-    assert "ends at bounds of the calibration's numbers (dtheta1 = 0.3 rad" in found.verdict["no_answer"]
+    assert "ends at bounds of calibration parameters (dtheta1 = 0.3 rad" in found.verdict["no_answer"]
     numbers = found.tables["gap_parameters"].query("effect == 'calibration'").set_index("parameter")
     assert numbers["at_bound"].to_dict()["dtheta1"] and not numbers["at_bound"].drop("dtheta1").any()
-    assert _told(found)[1].lead.startswith("No cause is named: ")
+    assert _answered(found)[1].lead.startswith("No cause is named: ")
 
 
 def test_a_large_gap_of_the_library_keeps_its_cause():
-    """A robot that misses by fifty times the noise, all of it play."""
+    """A robot with residuals of fifty times the noise, all of it backlash."""
     # a width of 0.0198 rad is next to its bound of 0.02 rad, where wind-up over a short travel replaces it
     effects = tuple(name for name in campaigns.EFFECTS if name != "friction_windup")
     frame = campaigns.measure((campaigns.strong("backlash", 150.0),))

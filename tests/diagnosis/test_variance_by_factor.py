@@ -1,4 +1,4 @@
-"""Where the gap lies and what a campaign can show, on gaps put where they are."""
+"""Variance of the gap by factor, and detectability, on gaps put where they are."""
 
 from dataclasses import dataclass, replace
 
@@ -152,7 +152,7 @@ def test_an_effect_that_the_calibration_knows_already_cannot_be_seen():
     case = case_of(measure(), {"arm_growth": ArmGrowth(), "servo_lag": EFFECTS["servo_lag"]})
     table = detectability(case, case.linearise(calibrate(case))).set_index("effect")
     assert table.loc["arm_growth", "visible_share"] < 1e-6 and not table.loc["arm_growth", "testable"]
-    assert "calibration" in table.loc["arm_growth", "note"]
+    assert "geometric parameters" in table.loc["arm_growth", "note"]
     assert table.loc["servo_lag", "testable"] and table.loc["servo_lag", "imitated_share"] < 0.05
 
 

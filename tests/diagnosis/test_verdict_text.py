@@ -76,7 +76,7 @@ def test_the_facts_fit_their_schema_and_are_the_same_bytes_every_time(changes, r
 def test_the_sentences_say_what_acts_how_much_how_sure_and_what_next():
     said = " ".join(answered(runs=(RUN,))["sentences"])
     for words in (
-        "misses by 0.37 mm at points left out of it (noise taken out)",
+        "the residual error is 0.37 mm at points left out of it (noise subtracted)",
         "60 % of that (95 %: 48 % to 78 %) is link flexure in leg 2, ",
         "flexure2 = 1.23 µm/N (95 %: 1.01 to 1.45): ",
         "20 % (95 %: 16 % to 26 %) is backlash, width1 = width2 = 0.000404 rad (95 %: 0.000365 to 0.000443): backlash ",
@@ -84,7 +84,7 @@ def test_the_sentences_say_what_acts_how_much_how_sure_and_what_next():
         "Causes by their share of the gap: link flexure 60 %, backlash 20 %.",
         "Probability that it acts: link flexure 0.98, backlash 0.97. Probability of exactly this answer: 0.97.",
         "10 % (95 %: 8 % to 13 %) does not repeat",
-        "Add them to the simulator and 0.020 mm is left",
+        "With them in the simulator the residual error on left-out runs is 0.020 mm",
         "the noise is 0.035 mm",
         "cannot rule out: drive compliance, servo lag.",
         "Next: drive line_1 in reverse. That decides whether servo lag acts.",
@@ -147,11 +147,11 @@ def test_where_no_cause_is_named_the_most_probable_answer_says_so():
     assert said[1] not in answered()["sentences"]
 
 
-@pytest.mark.parametrize(("sure", "told"), [(0.49, False), (0.51, True)])
-def test_what_does_not_repeat_is_told_where_it_more_likely_acts_than_not(sure, told):
+@pytest.mark.parametrize(("sure", "said"), [(0.49, False), (0.51, True)])
+def test_what_does_not_repeat_is_said_where_it_more_likely_acts_than_not(sure, said):
     budget = synthetic_gap.gap_budget(CAMPAIGN)
     unsure = budget.assign(probability=budget["probability"].mask(budget["kind"].isin(["scatter", "runs"]), sure))
-    assert ("does not repeat" in " ".join(answered(unsure)["sentences"])) == told
+    assert ("does not repeat" in " ".join(answered(unsure)["sentences"])) == said
 
 
 def test_without_a_pose_measured_twice_repeatability_is_unknown():
@@ -164,7 +164,7 @@ def test_without_a_pose_measured_twice_repeatability_is_unknown():
 
 
 @pytest.mark.parametrize(("factor", "gap", "why"), [(12.0, 0.02, "small"), (1.0, 0.0, "small"), (12.0, 0.2, "alike")])
-def test_where_shares_cannot_be_told_sizes_are_and_why(factor, gap, why):
+def test_where_shares_are_not_determined_sizes_are_said_and_why(factor, gap, why):
     budget = synthetic_gap.gap_budget(CAMPAIGN)
     shares = budget[["share", "share_low", "share_high"]] * (factor if gap else 0.0)
     said = " ".join(answered(budget.assign(**shares), gap_rms_mm=gap)["sentences"])
@@ -219,7 +219,7 @@ def test_an_effect_of_one_drive_of_an_arm_is_named_after_the_drive():
     assert "link flexure at axis2, " in said and " leg " not in said and "backlash between motor and link." in said
 
 
-def test_every_cause_tells_what_to_inspect_and_what_to_do_by_the_kind_of_the_drives():
+def test_every_cause_says_what_to_inspect_and_what_to_do_by_the_kind_of_the_drives():
     texts = [
         effect
         for effect in answered(drives=DriveWords(kinds=("length",) * 6))["effects"]
@@ -229,7 +229,7 @@ def test_every_cause_tells_what_to_inspect_and_what_to_do_by_the_kind_of_the_dri
     assert texts[0]["source"] == cause_texts("backlash").source and "drive arm" not in str(texts)
 
 
-def test_where_a_drive_errs_most_is_told_with_its_interval():
+def test_where_a_drive_error_is_largest_is_said_with_its_interval():
     places = [
         ("backlash", True, "axis1", "rad", 0.5, 2e-4, 1e-4, 3e-4),
         ("backlash", True, "axis2", "rad", np.radians(-37.0), -5e-4, -5.5e-4, -4.5e-4),
@@ -260,7 +260,7 @@ def test_what_the_unexplained_follows_is_said_where_one_variable_predicts_most_o
 
 def test_where_nothing_acts_or_the_library_lacks_it_no_effect_is_blamed():
     nothing = " ".join(answered(effects="none", leg=0, confusable_with="")["sentences"])
-    assert "nothing systematic is left" in nothing and " is backlash" not in nothing
+    assert "these data show no systematic error" in nothing and " is backlash" not in nothing
     unknown = " ".join(answered(effects="unexplained", leg=0)["sentences"])
     assert (
         "no effect of the library explains it: 5 % (95 %: 4 % to 6 %) of it" in unknown
@@ -277,12 +277,14 @@ def test_a_rounded_number_is_off_by_half_a_digit_at_most(value, digits):
 
 
 @given(st.floats(-1e3, 1e3), st.floats(1e-7, 1e2))
-def test_a_number_with_its_interval_is_told_to_two_digits_of_the_half_width(value, half):
+def test_a_number_with_its_interval_is_given_to_two_digits_of_the_half_width(value, half):
     text = verdict_text.with_interval(value, value - half, value + half, "mm")
-    told, low, high = (float(part) for part in re.fullmatch(r"(.+) mm \(95 %: (.+) to (.+)\)", text).groups())
+    rounded, low, high = (float(part) for part in re.fullmatch(r"(.+) mm \(95 %: (.+) to (.+)\)", text).groups())
     rounding = 0.051 * half + 1e-12 * abs(value)
     assert (
-        abs(told - value) <= rounding and abs(low - value + half) <= rounding and abs(high - value - half) <= rounding
+        abs(rounded - value) <= rounding
+        and abs(low - value + half) <= rounding
+        and abs(high - value - half) <= rounding
     )
     assert "-0 " not in text and "e" not in text
 

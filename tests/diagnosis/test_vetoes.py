@@ -30,7 +30,7 @@ LIBRARY = {name: _effect(name, count) for name, count in {"whole": 2, "first": 1
 
 
 def _found(off, whole=True):
-    """Evidence and posterior of data that one law makes, which two others together imitate but for a share `off`."""
+    """Evidence and posterior of data of one effect, which two others together explain except for a share `off`."""
     generator, shape = np.random.default_rng(1), (40, 3)
     own, more = generator.normal(size=(*shape, 2)), off * generator.normal(size=(*shape, 2))
     columns = {("first", 0): own[..., :1] + more[..., :1], ("second", 0): own[..., 1:] + more[..., 1:]}
@@ -58,12 +58,15 @@ def test_where_every_likely_set_holds_it_others_are_looked_for():
 
 def test_where_a_likely_set_does_without_it_nothing_is_searched(monkeypatch):
     found = _found(0.02)
-    beliefs = found.posterior
-    kept = beliefs.without("whole")
-    assert kept.height > beliefs.height - OPTIONS.negligible_nats and kept.best()[0].effects == {"first", "second"}
+    posterior = found.posterior
+    remaining = posterior.without("whole")
+    assert remaining.height > posterior.height - OPTIONS.negligible_nats and remaining.best()[0].effects == {
+        "first",
+        "second",
+    }
     monkeypatch.setattr(diagnose, "explore", lambda *_, **__: pytest.fail("searched"))
     rest = diagnose._without(found, {"whole"}, {"whole"}, PRIOR)
-    assert rest.best() == kept.best() and rest.marginal("whole") == 0.0
+    assert rest.best() == remaining.best() and rest.marginal("whole") == 0.0
     assert rest.weights.sum() == pytest.approx(1.0)
 
 
@@ -86,9 +89,9 @@ def inference():
     calibrated = calibrate(case)
     evidence = case.evidence(case.linearise(calibrated))
     decisive = evidence.on_library()
-    beliefs = explore(decisive, PRIOR)
+    posterior = explore(decisive, PRIOR)
     return InferenceResult(
-        case, calibrated, calibrated, fit_model(case, [calibrated]), evidence, beliefs, *beliefs.best()
+        case, calibrated, calibrated, fit_model(case, [calibrated]), evidence, posterior, *posterior.best()
     )
 
 

@@ -43,5 +43,5 @@ def test_a_robot_whose_lengths_are_calibrated_hides_it():
     found = _told("identifiable", None)
     assert found.verdict["effects"] == "none" and "tracker_scale" not in found.verdict["confusable_with"]
     row = found.tables["gap_identifiability"].set_index("effect").loc["tracker_scale"]
-    assert not row["testable"] and "takes it up entirely" in row["note"]
+    assert not row["testable"] and "cannot be separated from the geometric parameters" in row["note"]
     assert found.tables["gap_attribute"].set_index("effect").loc["tracker_scale", "probability"] == 0.0

@@ -57,7 +57,7 @@ def gap_verdicts(campaign, effects="link_flexure+backlash", **changes):
 
 
 def gap_budget(campaign):
-    """`gap_budget` of two effects that imitate each other a little, scatter and something unexplained."""
+    """`gap_budget` of two partly confounded effects, scatter and something unexplained."""
     shares = {"link_flexure": 0.6, "backlash": 0.2, "scatter": 0.1, "runs": 0.0, "unexplained": 0.05}
     kinds = {name: name if name in ("scatter", "runs", "unexplained") else "effect" for name in shares}
     shares["link_flexure and backlash"], kinds["link_flexure and backlash"] = 0.04, "covariance"

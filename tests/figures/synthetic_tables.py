@@ -153,8 +153,8 @@ def campaigns(z_down=True):
     row = {
         c.name: 1 if c.kind == "int64" else 1.0 for c in TABLES["campaigns"].columns if c.kind in ("int64", "float64")
     }
-    told = {"robot": "made_up", "source": "made up", "noise_from": "given", "notes": ""}
-    return check("campaigns", pd.DataFrame([row | told | {"campaign": CAMPAIGN, "z_down": z_down}]))
+    facts = {"robot": "made_up", "source": "made up", "noise_from": "given", "notes": ""}
+    return check("campaigns", pd.DataFrame([row | facts | {"campaign": CAMPAIGN, "z_down": z_down}]))
 
 
 def observability(unseen=1):

@@ -143,7 +143,7 @@ def test_a_figure_is_complete_and_its_files_are_the_same_bytes_every_time(name, 
     }
     assert not small
     width, height = first.get_size_inches() * 25.4
-    # the map alone stands beside the words of an answer
+    # the map alone is next to the words of an answer
     assert width == pytest.approx(85.0 if name == "gap_map" else 175.0) and height < 240.0
     box = first.get_tightbbox()
     assert min(box.x0, box.y0) > -0.01 and box.x1 * 25.4 < width + 0.3 and box.y1 * 25.4 < height + 0.3

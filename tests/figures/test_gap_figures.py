@@ -89,7 +89,7 @@ def test_negative_covariances_extend_the_budget_to_the_left(frames):
     axes = draw("gap", frames | {"gap_budget": budget.assign(share=shared)}).axes[1]
     bars = [(bar.get_x(), bar.get_width()) for bar in axes.patches]
     assert (0.0, -0.2) in bars and axes.get_xlim()[0] == pytest.approx(-0.2)
-    # but for the calibration's 0.5 %, too little to be drawn
+    # except for the calibration's 0.5 %, too little to be drawn
     assert sum(width for _, width in bars) == pytest.approx(0.995)
 
 
@@ -172,7 +172,7 @@ def test_odd_verdicts_are_drawn_too(effects, frames):
     assert ("closed" in bold) == ("+" in effects) and ("nothing" in bold) == ("+" not in effects)
     assert len(rest) == 1 and "resimulated" in panel(figure, "(c)").get_xlabel() and not panel(figure, "(c)").child_axes
     assert [text.get_text() for text in panel(figure, "(d)").get_legend().get_texts()] == [
-        "calibrated sim",
+        "calibrated model",
         "noise, rms",
     ]
 
@@ -206,7 +206,7 @@ def test_confusion_tables_count_every_robot_and_frame_the_right_answers():
         )
 
 
-def test_both_plants_stand_beside_each_other():
+def test_both_plants_are_compared():
     frames = made_up.withheld_tables()
     figure = draw("withheld_plants", frames)
     for check, title in (("mujoco", "robots, driven by MuJoCo"), ("own", "robots, the same, own plant")):

@@ -61,7 +61,7 @@ class ProductModel(NamedTuple):
     def make(cls, problem, blocks, steps, grams, prior_scales):
         """Model of a MarginalProblem without nuisance parameters at prior_scales (terms,).
 
-        blocks, steps: as in `rrru.diagnosis.payload_nuisance.borne`; grams: as in
+        blocks, steps: as in `rrru.diagnosis.payload_nuisance.with_nuisance`; grams: as in
         `rrru.diagnosis.marginal_problem.MarginalProblem.of`, of one level.
         """
         k, q = len(problem.size), len(steps)

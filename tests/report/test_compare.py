@@ -1,4 +1,4 @@
-"""Two calibrations beside each other: what differs is told, what chance makes is not, on points that neither saw."""
+"""Two calibrations compared: differences beyond chance are reported, others are not, on points that neither used."""
 
 import numpy as np
 import pandas as pd
@@ -56,7 +56,7 @@ def shifted(own, values):
     return own.reset_index().assign(value=values)
 
 
-def test_a_change_is_told_with_its_chi_square_and_its_parameter(folder):
+def test_a_change_is_reported_with_its_chi_square_and_its_parameter(folder):
     first, second = sides(folder, "a", "changed")
     found = compare.difference(first, second, "both")
     # the chi-square by its definition, from the tables
@@ -77,7 +77,7 @@ def test_a_change_is_told_with_its_chi_square_and_its_parameter(folder):
     assert wins == [True, False]
 
 
-def test_the_better_calibration_foretells_even_the_other_s_points_better(folder):
+def test_the_better_calibration_predicts_even_the_other_s_points_better(folder):
     first, second = sides(folder, "poor", "a")
     judged = unseen(first, second, "both")
     assert [place.campaign for place in judged] == ["poor", "a"]
@@ -98,7 +98,7 @@ def test_points_that_both_have_measured_are_seen_by_neither(folder):
     assert all(abs(place.rms_mm[1] / place.rms_mm[0] - 1.0) < 0.1 for place in judged)
     same = unseen(first, first, "both")
     assert len(same) == 1 and same[0].rms_mm[0] == same[0].rms_mm[1] and same[0].chance == 1.0
-    # what was left out is foretold worse than what was fitted
+    # what was left out is predicted worse than what was fitted
     fitted = first.frames["calibrations"].query("calibration == 'both' and method == 'least_squares'")["rms_mm"].iloc[0]
     assert same[0].rms_mm[0] > fitted
 
@@ -174,7 +174,7 @@ def others(tmp_path_factory):
             "{1}:framed",
             r"of framed the instrument's frame is calibrated, too \(world_x\), of a it is not",
         ),
-        ("{0}:a", "{1}:turned", "other things were read: of a the tool, of turned ball; allowed"),
+        ("{0}:a", "{1}:turned", "the readings differ: of a the tool, of turned ball; allowed"),
         ("{0}:a", "{1}:bare", "lacks verdict.json; run `snakemake` for it first"),
         ("nothing", "{0}:a", "'nothing' is no folder, and no calibrated campaign of results"),
     ],

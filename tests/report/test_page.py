@@ -63,7 +63,7 @@ def _with_file(folder, **verdict):
     return written(folder)
 
 
-def test_what_a_corrected_file_is_worth_stands_beside_its_link(folder):
+def test_errors_of_a_corrected_file_are_next_to_its_link(folder):
     remains = "this URDF holds the geometry only and not backlash: 0.54 mm rms remain; use corrected_drives"
     text = _with_file(
         folder, file_error_mm=0.31, file_error_fresh_mm=0.54, file_remainder=remains, not_in_model="backlash"
@@ -76,16 +76,17 @@ def test_what_a_corrected_file_is_worth_stands_beside_its_link(folder):
 
 def test_a_corrected_file_that_is_worse_than_the_calibration_is_the_headline(folder):
     headline = (
-        "the corrected file misses the readings by 0.35 mm rms, the calibration by 0.009 mm; it cannot hold: ball1"
+        "the corrected file has a residual error of 0.35 mm rms, the calibration one of 0.009 mm; it cannot hold: ball1"
     )
     text = _with_file(folder, file_error_mm=0.3, file_error_fresh_mm=0.3, file_headline=headline, not_in_model="ball1")
     assert f'<p class="lead">T{headline[1:]}.</p>' in text
 
 
 def test_a_file_that_was_not_corrected_has_no_link_but_a_reason(folder):
-    text = _with_file(folder, not_in_model="not corrected: it would miss by 1 mm rms")
+    text = _with_file(folder, not_in_model="not corrected: its residual error would be 1 mm rms")
     assert (
-        "corrected.urdf" not in text and "Your robot&#39;s file was not corrected: it would miss by 1 mm rms." in text
+        "corrected.urdf" not in text
+        and "Your robot&#39;s file was not corrected: its residual error would be 1 mm rms." in text
     )
 
 
@@ -95,7 +96,7 @@ def test_a_corrected_file_that_is_the_diagnosed_robot_is_off_by_no_rounding(fold
 
 
 def test_without_an_answer_that_is_the_headline_and_no_cause_is_on_the_card(folder):
-    why = "the best answer leaves 12 mm rms, 600 times the noise of 0.02 mm"
+    why = "the residual of the best answer is 12 mm rms, 600 times the noise of 0.02 mm"
     text = _with_file(folder, effects="unexplained", no_answer=why, not_in_model=f"not corrected: {why}")
     card = text[text.index(f'id="answer-{CAMPAIGN}"') : text.index("</article>")]
     assert f'<p class="lead">No cause is named: {why}.</p>' in card and "corrected.urdf" not in card

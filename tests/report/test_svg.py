@@ -1,4 +1,4 @@
-"""Figures within a page: every name once, every reference answered, nothing lost, captions kept."""
+"""Figures within a page: every name once, every reference answered, nothing lost, captions unchanged."""
 
 import xml.etree.ElementTree as ElementTree
 

@@ -1,4 +1,4 @@
-"""Which numbers may be trusted: each kind of doubt is told, the worst one first."""
+"""Which numbers may be trusted: each kind of reason against it is given, the worst one first."""
 
 import numpy as np
 import pandas as pd
@@ -57,7 +57,7 @@ def test_every_number_has_its_95_percent_interval():
     assert said.loc["sure", "with_effects"] == "0.100 mm (95 %: 0.080 to 0.120)"
 
 
-def test_without_effects_nothing_is_biased_and_beside_something_unexplained_all_is_doubtful():
+def test_without_effects_nothing_is_biased_and_with_something_unexplained_all_is_doubtful():
     assert judgements(*tables("none", 0.5))["sure"].startswith("use")
     said = judgements(*tables("unexplained", 0.5))
     assert said["sure"].startswith("doubtful") and said["bound"].startswith("do not use")

@@ -1,4 +1,4 @@
-"""Sizes before and after a calibration that stand beside each other are of the same points and the same kind."""
+"""Sizes before and after a calibration that are compared are of the same points and the same kind."""
 
 import numpy as np
 import pandas as pd
@@ -22,7 +22,7 @@ def tables():
     return errors, points
 
 
-def test_the_noise_is_taken_out_of_both_at_the_same_points(tables):
+def test_the_noise_is_subtracted_from_both_at_the_same_points(tables):
     found = worth(*tables, np.sqrt(3.0) * NOISE_MM, False)
     assert found.points == COUNT - 1
     assert (found.before_mm, found.seen_mm) == pytest.approx((BEFORE_MM, SEEN_MM), rel=0.01)
@@ -33,11 +33,11 @@ def test_nothing_is_said_where_nothing_was_compared(tables):
     assert worth(errors[errors["mode"] == "model"], points, 0.1, False) is None
 
 
-def test_a_calibration_that_does_not_carry_over_is_said_to_have_taken_up_the_cause():
+def test_a_calibration_that_does_not_carry_over_is_said_to_have_absorbed_the_cause():
     found = Worth(144, 0.18, 0.15, True)
     assert (
-        "0.18 mm at the same 144 points, noise taken out alike, once the instrument's frame"
+        "0.18 mm at the same 144 points, with the same noise subtracted, once the instrument's frame"
         in sentences(found, 0.23)[0]
     )
-    assert "taken up a part of the cause" in sentences(found, 0.23)[1]
+    assert "absorbed a part of the cause" in sentences(found, 0.23)[1]
     assert len(sentences(found, 0.17)) == 1

@@ -1,8 +1,8 @@
 """The user's own file with what a diagnosis has found, and how far that closes the gap.
 
-Every effect that changes nothing but constant numbers is geometry, as the calibration's numbers are; `drive_compliance`
-is the stiffness of the drives and `backlash` their play. Anything else a file cannot hold; nor does it know of loads
-that it does not carry itself. The model stands in the frame of the measurements. Lengths in mm, angles in rad.
+Every effect that changes constants alone is geometry, as the calibration's parameters are; `drive_compliance` is the
+stiffness of the drives and `backlash` their backlash. A file cannot hold anything else, nor loads other than those of
+its own masses. The model is in the frame of the measurements. Lengths in mm, angles in rad.
 """
 
 from dataclasses import dataclass, field, replace
@@ -15,7 +15,7 @@ from rrru.diagnosis.calibrate import calibrate
 from rrru.diagnosis.inference import with_effects
 from rrru.diagnosis.model_fit import fit_model
 from rrru.diagnosis.options import OPTIONS
-from rrru.diagnosis.result_notes import weight_notes
+from rrru.diagnosis.result_notes import payload_notes
 from rrru.diagnosis.result_tables import parameter_rows
 from rrru.formats.file_changes import Found, held_by
 from rrru.formats.mjcf_writer import to_mjcf
@@ -23,8 +23,8 @@ from rrru.formats.robot_file import mjcf_parts, urdf_parts
 from rrru.formats.structure import structure_of
 from rrru.formats.urdf_writer import to_urdf
 
-# what a drive's numbers in a file are, by the effect and the stem of its parameters
-_COMPLIANCE, _PLAY = ("drive_compliance", "compliance"), ("backlash", "width")
+# parameters of a drive in a file: the effect and the stem of its parameters
+_COMPLIANCE, _BACKLASH = ("drive_compliance", "compliance"), ("backlash", "width")
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,8 @@ class Corrected:
     """A corrected file.
 
     text; not_in_model: what it cannot hold, in words; lacking: the effects among these; found: what there is to hold;
-    in_file: values by parameter of the effects that it holds beside geometry; mjcf: whether it is one, not a URDF.
+    in_file: values by parameter of the effects that it holds in addition to geometry; mjcf: whether it is an MJCF, not
+    a URDF.
     """
 
     text: str
@@ -67,18 +68,18 @@ def found_of(inference, stated_reflectors=False):
         _places(case, stated_reflectors),
         tuple(case.mechanism.tool_mm),
         _of_drives(numbers, *_COMPLIANCE, count),
-        _of_drives(numbers, *_PLAY, count),
+        _of_drives(numbers, *_BACKLASH, count),
         dict(enumerate(loads.tolist())),
     )
-    held = {name for name, _ in constant} | {_COMPLIANCE[0], _PLAY[0]}
+    held = {name for name, _ in constant} | {_COMPLIANCE[0], _BACKLASH[0]}
     return found, [name for name, _ in state.effects if name not in held]
 
 
 def fitted_in_file(inference, section):
     """The InferenceResult with its hypothesis fitted in geometric numbers that the robot's own file can hold.
 
-    Numbers of others, such as shifts between the axes of a ball, can stand in for those of the file in the fit; written
-    without them the file would miss by what they did. section: the robot's entry in the configuration.
+    Other parameters, such as shifts between the axes of a ball, can absorb errors in the fit; a file written without
+    them would lack these corrections. section: the robot's entry in the configuration.
     """
     mechanism = inference.case.mechanism
     if "urdf" in section:
@@ -110,8 +111,9 @@ def _with_misfit(inference, spread):
 
 def _of_drives(numbers, effect, stem, count):
     """(value, standard error) of an effect's parameter of every drive by its number from 0 on."""
-    own = numbers[numbers["effect"] == effect].set_index("parameter")
-    return {k: tuple(own.loc[f"{stem}{k + 1}", ["value", "standard_error"]]) for k in range(count) if len(own)}
+    of_effect = numbers[numbers["effect"] == effect].set_index("parameter")
+    columns = ["value", "standard_error"]
+    return {k: tuple(of_effect.loc[f"{stem}{k + 1}", columns]) for k in range(count) if len(of_effect)}
 
 
 def _places(case, stated):
@@ -137,7 +139,7 @@ def corrected(inference, section, folder):
     diagnosed, lacking = found_of(inference, reflectors)
     others, effects = [*lacking], [name for name, _ in inference.state.effects]
     if "urdf" in section:
-        lacking += [name for name in effects if name in (_COMPLIANCE[0], _PLAY[0])]
+        lacking += [name for name in effects if name in (_COMPLIANCE[0], _BACKLASH[0])]
     held = tuple(name for name in effects if name not in lacking)
     fitted = fitted_in_file(with_effects(inference, held) if lacking else inference, section)
     found, _ = found_of(fitted, reflectors)
@@ -145,13 +147,13 @@ def corrected(inference, section, folder):
         found = replace(found, spread=_with_misfit(fitted, found.spread))
     if inference.posterior.probability_unexplained > OPTIONS.min_unexplained_probability:
         others.append("unexplained")
-    others += weight_notes(inference)
+    others += payload_notes(inference)
     if "urdf" in section:
         chain = {key: section.get(key) for key in ("base", "tip", "home")}
         found = replace(found, compliance=diagnosed.compliance, play=diagnosed.play)
         text, lost = to_urdf(section["urdf"], found, folder, **chain)
         return Corrected(text, (*others, *lost), tuple(lacking), found)
     text, lost = to_mjcf(section["mjcf"], section["platform"], found, folder)
-    drives = ((*_COMPLIANCE, found.compliance), (*_PLAY, found.play))
+    drives = ((*_COMPLIANCE, found.compliance), (*_BACKLASH, found.play))
     in_file = {name: {f"{stem}{k + 1}": value for k, (value, _) in each.items()} for name, stem, each in drives if each}
     return Corrected(text, (*others, *lost), tuple(lacking), found, in_file, mjcf=True)

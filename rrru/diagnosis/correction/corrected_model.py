@@ -22,15 +22,15 @@ from rrru.seeds import stream
 from rrru.simulation.mujoco_robot import MujocoRobot
 from rrru.store.atomic_write import write_text
 
-# what of a Motion has no row for each point
-_WHOLE = ("robot", "path_drive", "load_slopes")
+# fields of a Motion that have no row for each point
+_WITHOUT_ROWS = ("robot", "path_drive", "load_slopes")
 
 
 def write_corrected(diagnosis, section, masses, file, seed=0):
-    """The Diagnosis with what its robot's corrected file is worth, and `corrected_drives`; writes the file.
+    """The Diagnosis with residual errors of its robot's corrected file, and `corrected_drives`; writes the file.
 
-    A file that cannot be corrected, or that is no robot once it is, as where a loop of bodies closes no more, becomes
-    an empty one that says why, as does `not_in_model`. section: the robot's entry in the configuration; masses: the
+    A file that cannot be corrected, or whose loops of bodies do not close afterwards, becomes an empty one with the
+    reason in a comment and in `not_in_model`. section: the robot's entry in the configuration; masses: the
     robot's; seed: of the fresh poses at which file and diagnosis are compared.
     """
     file, inference = Path(file), diagnosis.inference
@@ -62,19 +62,21 @@ def write_corrected(diagnosis, section, masses, file, seed=0):
 
 def _left_mm(steps, kind):
     """Root mean square residual in mm on all trajectories of the last row of a kind of `gap_shrink`, NaN for none."""
-    own = steps[(steps["kind"] == kind) & (steps["trajectory"] == "*")] if len(steps) else steps
-    return float(own["rms_mm"].iloc[-1]) if len(own) else np.nan
+    chosen = steps[(steps["kind"] == kind) & (steps["trajectory"] == "*")] if len(steps) else steps
+    return float(chosen["rms_mm"].iloc[-1]) if len(chosen) else np.nan
 
 
 def _refuse_worse(more):
-    """Raise ConfigError where the corrected file misses by more than the file as it came."""
+    """Raise ConfigError where the residual error of the corrected file exceeds that of the file as it came."""
     given, written = _left_mm(more, "given_model"), _left_mm(more, "corrected_model")
     if written > given:
-        raise ConfigError(f"it would miss by {written:.3g} mm rms, the file as it came misses by {given:.3g} mm")
+        raise ConfigError(
+            f"its residual error would be {written:.3g} mm rms, that of the file as it came is {given:.3g} mm"
+        )
 
 
 def _remainder(shrink, more, written, error):
-    """What a corrected file leaves beyond what the diagnosis does, in words, empty where it is next to nothing.
+    """Residual error of a corrected file beyond that of the diagnosis, in words, empty where negligible.
 
     written: the Corrected file; error: its FileError.
     """
@@ -90,7 +92,9 @@ def _remainder(shrink, more, written, error):
 
 def _holds(written):
     """What a Corrected file's format holds."""
-    return "MJCF holds geometry, compliance and play of the drives" if written.mjcf else "URDF holds the geometry only"
+    if written.mjcf:
+        return "MJCF holds geometry, compliance and backlash of the drives"
+    return "URDF holds the geometry only"
 
 
 def _headline(written, error):
@@ -100,8 +104,8 @@ def _headline(written, error):
     lost, most = written.not_in_model, OPTIONS.max_listed_numbers
     more = f" and {len(lost) - most} more" if len(lost) > most else ""
     lacking = f"; it cannot hold: {', '.join(lost[:most])}{more}" if lost else ""
-    sizes = f"{error.readings_mm:.2g} mm rms, the calibration by {error.calibrated_mm:.2g} mm"
-    return f"the corrected file misses the readings by {sizes}{lacking}"
+    sizes = f"{error.readings_mm:.2g} mm rms, the calibration one of {error.calibrated_mm:.2g} mm"
+    return f"the corrected file has a residual error of {sizes}{lacking}"
 
 
 def _model(inference, written, section, file):
@@ -136,10 +140,10 @@ def gap_rows(inference, corrected, section, file, shrink):
         poses = [_closed(inference.case, robot, effects) for _, robot, effects in models]
     result, case = [], inference.case
     known = case.on_robot & case.complete({term.effect for term in inference.fit.terms})
-    for (kind, robot, _), (own, twists) in zip(models, poses, strict=True):
+    for (kind, robot, _), (at, twists) in zip(models, poses, strict=True):
         twists = twists + _instrument(case, robot, corrected.found, kind == "corrected_model")
         # the file is not judged where the sense of arrival of a drive is unknown
-        left = np.where(known[:, None], case.by_other(robot, own, twists), np.nan)
+        left = np.where(known[:, None], case.by_other(robot, at, twists), np.nan)
         if np.isfinite(left).all(axis=1).any():
             result.append(model_row(shrink, kind, left, case.noise_mm))
     return pd.DataFrame(result), why
@@ -159,7 +163,7 @@ def simulated(motion, robot, file, platform):
     count = min(len(motion), OPTIONS.max_driven_points)
     first = replace(
         motion,
-        **{name: getattr(motion, name)[:count] for name in motion.__dataclass_fields__ if name not in _WHOLE},
+        **{name: getattr(motion, name)[:count] for name in motion.__dataclass_fields__ if name not in _WITHOUT_ROWS},
     )
     poses, _ = MujocoRobot(robot, file, platform).posed(first, first.position_mm)
     whole = _nowhere(robot, len(motion))
@@ -190,7 +194,7 @@ def _closed(case, robot, effects):
 def _instrument(case, robot, found, corrected):
     """Twists (1, sites, 6) of what is read: the reflectors' places, and the tool's where it is corrected or these are.
 
-    The frame is the file's, so that reflectors beside the robot are moved by it.
+    The frame is the file's, so that reflectors that are not on the robot are moved by it.
     """
     result, numbers = robot.twists(), robot.legs.site_numbers
     reads = case.mechanism.reads
@@ -204,6 +208,6 @@ def _instrument(case, robot, found, corrected):
         world = placement_of(found.twists.get(WORLD, np.zeros(6)))
         for name in pd.unique(sites):
             nominal = places[np.flatnonzero(sites == name)[0]]
-            own = nominal + found.twists.get(name, np.zeros(6))[:3]
-            result[0, numbers[name], :3] = world[:3, :3] @ own + world[:3, 3] - nominal
+            corrected_place = nominal + found.twists.get(name, np.zeros(6))[:3]
+            result[0, numbers[name], :3] = world[:3, :3] @ corrected_place + world[:3, 3] - nominal
     return result

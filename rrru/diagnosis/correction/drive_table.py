@@ -1,6 +1,6 @@
-"""Compensation table: which drive values bring the robot, as diagnosed, to where it is commanded. mm and rad.
+"""Compensation table: drive values that bring the robot, as diagnosed, to the commanded positions. mm and rad.
 
-The grid fills the box about the measured points as far as one of these is near; it is the only thing to go by where no
+The grid fills the box about the measured points as far as one of these is near. It is the only correction where no
 model file can hold what was found. The robot is at rest, as warm as at the campaign's end.
 """
 
@@ -15,7 +15,7 @@ from rrru.effects.motion import Course, make_motion
 from rrru.effects.protocol import Contribution
 from rrru.kinematics.inverse import inverse_kinematics
 
-# how far the drives come from, longer than any play
+# how far away the drives come from, longer than any backlash
 _APPROACH = {"rad": OPTIONS.approach_distance_rad, "mm": OPTIONS.approach_distance_mm}
 
 
@@ -35,12 +35,12 @@ def corrected_drives(inference, masses):
     payload, end_s = at_end(case)
     found = {}
     for approach in (-1, 1):
-        told = nominal
+        corrected = nominal
         for _ in range(OPTIONS.correction_iterations):
-            motion = at_rest(robot, masses, (position, told, payload, end_s), approach, nominal)
+            motion = at_rest(robot, masses, (position, corrected, payload, end_s), approach, nominal)
             twists = robot.twists(inference.state.deviations) + effect_twists(inference, motion)
-            told = inverse_kinematics(robot, (position, turn), (nominal.copy(), position), twists)
-        found[approach] = told
+            corrected = inverse_kinematics(robot, (position, turn), (nominal.copy(), position), twists)
+        found[approach] = corrected
     if np.nanmax(np.abs(found[1] - found[-1]), initial=0.0) < OPTIONS.min_sense_difference:
         found = {0: found[1]}
     return _table(robot, (position, turn), (nominal, found), {"payload_kg": payload, "time_s": end_s})
@@ -50,12 +50,12 @@ def _table(robot, place, drives, state):
     """The rows of places and drives: nominal ones (n, K), and found ones (n, K) by the side that they come from."""
     (position, turn), (nominal, found) = place, drives
     vectors = Rotation.from_matrix(turn).as_rotvec().reshape(-1, 3)
-    told = {"point": np.arange(1, len(position) + 1)} | rows.vector_columns("command", position)
-    told |= {f"command_r{axis}_rad": value for axis, value in zip("xyz", vectors.T, strict=True)}
-    told |= dict(zip(robot.parts.columns, nominal.T, strict=True)) | state
+    columns = {"point": np.arange(1, len(position) + 1)} | rows.vector_columns("command", position)
+    columns |= {f"command_r{axis}_rad": value for axis, value in zip("xyz", vectors.T, strict=True)}
+    columns |= dict(zip(robot.parts.columns, nominal.T, strict=True)) | state
     names = [f"corrected_{name}" for name in robot.parts.columns]
     frames = [
-        pd.DataFrame(told | dict(zip(names, values.T, strict=True))).assign(approach=side)
+        pd.DataFrame(columns | dict(zip(names, values.T, strict=True))).assign(approach=side)
         for side, values in found.items()
     ]
     table = pd.concat(frames, ignore_index=True)

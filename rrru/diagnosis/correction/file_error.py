@@ -1,7 +1,7 @@
-"""How far the robot of a corrected file stands from the one that a diagnosis has found, at the same drive values.
+"""Distance of the robot of a corrected file from the one that a diagnosis has found, at the same drive values.
 
-Compared are the points that were read, at the measured poses and at fresh ones between them. The file's robot is closed
-at its drive values, with the laws of what the file holds beside geometry. Lengths in mm, angles in rad.
+It compares the points that were read, at the measured poses and at fresh ones between them. The file's robot is closed
+at its drive values, with the effects that the file holds in addition to geometry. Lengths in mm, angles in rad.
 """
 
 from dataclasses import dataclass, replace

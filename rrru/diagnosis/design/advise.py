@@ -63,7 +63,7 @@ def advise(inference, verdict, masses, stated=None, sizes=None):
         result, first = result + row, first + row
     runs = pd.DataFrame(result, columns=["contest", *_COLUMNS])
     runs = runs[runs["gain_nats"] > OPTIONS.min_run_gain_nats]
-    # of runs that decide, those that decide what matters most; of others those that tell most
+    # decisive runs first, those of the most important contest before others; then the most informative ones
     turn = runs["contest"].where(runs["gain_nats"] > OPTIONS.decisive_gain_nats, len(contests))
     runs = runs.assign(turn=turn).sort_values(
         ["turn", "gain_nats", "run"], ascending=[True, False, True], kind="stable"
@@ -83,7 +83,7 @@ def _runs(inference, contests, masses, limits):
         return []
     planned, result = _planned(inference.case, table, masses), []
     for number, contest in enumerate(contests):
-        if not _tell(planned, contest):
+        if not _have_inputs(planned, contest):
             continue
         now, added = worth(inference, contest.truth, contest.imitator, planned)
         start = now.nats()
@@ -98,8 +98,8 @@ def _planned(case, table, masses):
     return make_case(table, case.mechanism, masses, case.noise_mm, case.effects, arm_mm=case.arm_mm)
 
 
-def _tell(planned, contest):
-    """Whether planned runs tell what the effects of a Contest need, such as times or temperatures."""
+def _have_inputs(planned, contest):
+    """Whether planned runs have what the effects of a Contest need, such as times or temperatures."""
     answers = contest.truth, contest.imitator
     return all(term.effect in planned.library for hypothesis, _ in answers for term in hypothesis.terms)
 
@@ -107,27 +107,27 @@ def _tell(planned, contest):
 def _poses(inference, contest, masses, limits):
     """The row of poses of `gap_next_runs` in a list, which is empty where there are none, and `gap_next_poses`.
 
-    They are driven as the campaign was, or faster, or with a higher payload, whichever tells most.
+    They are driven as the campaign was, or faster, or with a higher payload, whichever is most informative.
     """
     case, best = inference.case, ([], NOTHING.poses)
     passes = poses.passes(case.measurements, case.mechanism)
     if not len(passes):
         return best
-    told_speed, own_load = (float(case.measurements[name].median()) for name in ("speed_mm_s", "payload_kg"))
-    own_speed = told_speed if np.isfinite(told_speed) else _speed(case.measurements)
+    stated_speed, own_load = (float(case.measurements[name].median()) for name in ("speed_mm_s", "payload_kg"))
+    own_speed = stated_speed if np.isfinite(stated_speed) else _speed(case.measurements)
     last_s, own_load, most = _end_s(case.measurements), float(np.nan_to_num(own_load)), 0.0
     for fast, loaded in product((False, True), repeat=2):
-        speed = limits.fast(told_speed, np.full(1, np.nan)) if fast else own_speed
+        speed = limits.fast(stated_speed, np.full(1, np.nan)) if fast else own_speed
         load = limits.loaded_kg(own_load) if loaded else own_load
-        if (fast and not (speed > told_speed and np.isfinite(last_s))) or (loaded and not load > own_load):
+        if (fast and not (speed > stated_speed and np.isfinite(last_s))) or (loaded and not load > own_load):
             continue
-        # a pass at which a drive would be too fast is none
+        # passes at which a drive would be too fast are left out
         some = passes.some([not fast or limits.slower(rate * speed) >= 1.0 for rate in passes.rates_per_mm])
         if not len(some) or not limits.allows(speed, load):
             continue
         table = some.commands(case.mechanism, last_s + OPTIONS.pause_between_runs_s, speed, load)
         planned = _planned(case, table, masses)
-        if not _tell(planned, contest):
+        if not _have_inputs(planned, contest):
             continue
         now, added = worth(inference, contest.truth, contest.imitator, planned)
         chosen, _ = greedy(now, added, OPTIONS.max_advised_poses)
@@ -135,7 +135,7 @@ def _poses(inference, contest, masses, limits):
         if not chosen:
             continue
         gain = sum((added[number] for number in chosen), now).nats() - now.nats()
-        # one that tells hardly more is not worth a payload
+        # a higher payload or speed has to be clearly more informative
         if gain > OPTIONS.min_gain_ratio_of_harder_poses * most:
             count, most = len(chosen), gain
             words = " ".join([f"{count} poses", *_how(fast, loaded, speed, load)]), "poses", "poses", False
@@ -146,7 +146,7 @@ def _poses(inference, contest, masses, limits):
 
 
 def _how(fast, loaded, speed, load):
-    """In words what of a kind of pass is not the campaign's own."""
+    """In words how a kind of pass differs from those of the campaign."""
     return [f"at {speed:g} mm/s"] * fast + [f"with {load:g} kg payload"] * loaded
 
 
@@ -221,5 +221,5 @@ def _pass(first, number, start_s, reverse, speed_mm_s, payload_kg):
         # the same profile, driven faster: the average speed over the run rises in proportion
         time = time * own_speed / speed_mm_s
     measured = rows.vector_columns("measured", rows.command(run))
-    told = {"run": number, "time_s": start_s + time, "speed_mm_s": speed_mm_s, "payload_kg": payload_kg}
-    return run.assign(**told, status="ok", **measured)
+    planned = {"run": number, "time_s": start_s + time, "speed_mm_s": speed_mm_s, "payload_kg": payload_kg}
+    return run.assign(**planned, status="ok", **measured)

@@ -1,10 +1,10 @@
-"""What further points would tell between two answers: the log Bayes factor to expect of them, in nats.
+"""Expected log Bayes factor of further points between two answers, in nats.
 
-If hypothesis A holds with its fitted numbers, the data that it makes differ from the best that hypothesis B can do by
+If hypothesis A holds with its fitted parameters, its data differ from the best fit of hypothesis B by
 
     I = 1/2 min_b |(y_A - X_B b) / sigma|^2 + prior of b
 
-nats. Further points add to the sums of squares and products that I is made of; what I grows by is their worth.
+nats. Further points add to the sums of squares and products that I is made of; the increase of I is their worth.
 """
 
 from dataclasses import dataclass, replace
@@ -28,7 +28,7 @@ class Sums:
 
     @classmethod
     def of(cls, design, data, noise_mm):
-        """Of a design (n, 3, k) and data (n, 3) under a noise per axis."""
+        """The Sums of a design (n, 3, k) and data (n, 3) under a noise per axis."""
         flat, target = design.reshape(-1, design.shape[-1]) / noise_mm, data.ravel() / noise_mm
         return cls(flat.T @ flat, flat.T @ target, float(target @ target))
 
@@ -40,18 +40,18 @@ class Sums:
         return float(0.5 * (self.square - moment @ np.linalg.solve(scaled, moment)))
 
 
-def worth(inference, truth, imitator, planned):
+def worth(inference, truth, rival, planned):
     """Sums of the present campaign, the prior among them, and of each run of a planned Case in order of its number.
 
-    truth, imitator: the answers, each (hypothesis, level) as `Posterior.best_of` gives it.
+    truth, rival: the answers, each (hypothesis, level) as `Posterior.best_of` gives it.
     """
-    (hypothesis, level), (rival, rival_level) = truth, imitator
+    (hypothesis, level), (other, other_level) = truth, rival
     case, evidence = inference.case, inference.evidence
-    terms = hypothesis.terms + rival.terms
-    # what the weight is off by is the same in both answers
+    terms = hypothesis.terms + other.terms
+    # the errors of payload and tilt are the same in both answers
     keys = list(dict.fromkeys((t.effect, t.shape) for t in terms))
     here, planned = (reachable(replace(one, nuisance_sd={}), inference.state) for one in (case, planned))
-    # both about one state: the evidence's own linearisation is that of the fit before
+    # both about one state: the linearisation of the evidence is that of the previous fit
     present, there = (one.linearise(inference.state, keys) for one in (here, planned))
     mean, _ = evidence.coefficients(hypothesis.terms, hypothesis.prior_scales[level], level)
     mean = mean[: sum(spread(case.library[t.effect].coordinates, t.legs).shape[1] for t in hypothesis.terms)]
@@ -59,9 +59,9 @@ def worth(inference, truth, imitator, planned):
     for linear in (present, there):
         none = np.zeros((*linear.data.shape, 0))
         made.append(np.concatenate([none, *signatures(case.library, linear, hypothesis.terms)], axis=-1) @ mean)
-        designs.append(np.concatenate([linear.base, *signatures(case.library, linear, rival.terms)], axis=-1))
+        designs.append(np.concatenate([linear.base, *signatures(case.library, linear, other.terms)], axis=-1))
     penalty = np.zeros(designs[0].shape[-1])
-    penalty[there.base.shape[-1] :] = evidence.scales(rival.terms, rival.prior_scales[rival_level]) ** -2.0
+    penalty[there.base.shape[-1] :] = evidence.scales(other.terms, other.prior_scales[other_level]) ** -2.0
     now = Sums.of(designs[0], made[0], case.noise_mm) + Sums(np.diag(penalty), np.zeros(len(penalty)), 0.0)
     runs = [planned.run == number for number in np.unique(planned.measurements["run"])]
     return now, [Sums.of(designs[1][run], made[1][run], case.noise_mm) for run in runs]

@@ -1,7 +1,7 @@
 """Poses to drive for a diagnosis: short straight passes in the box about all that a campaign has measured.
 
-A pose is passed in the middle of a straight line between rest and rest, since what play, friction and lag do at it
-depends on how it is reached. A platform that the drives can orient keeps through a pass the orientation that was
+A pose is passed in the middle of a straight line between rest and rest, since the effects of backlash, friction and lag
+depend on how it is reached. A platform that the drives can orient keeps through a pass the orientation that was
 commanded next to its start. Lengths in mm, speeds in mm/s.
 """
 
@@ -72,13 +72,13 @@ class Passes:
             profile = Trapezoid(OPTIONS.pass_length_mm, speed_mm_s, speed_mm_s**2 / OPTIONS.pass_length_mm)
             time = start_s + profile.time(np.linspace(0.0, OPTIONS.pass_length_mm, OPTIONS.points_per_pass))
         points_of_pass = np.arange(1, OPTIONS.points_per_pass + 1)
-        told = {
+        numbers = {
             "run": np.repeat(np.arange(1, count + 1), len(points_of_pass)),
             "point": np.tile(points_of_pass, count),
         }
         drives = dict(zip(mechanism.parts.columns, self.drives.reshape(len(points), -1).T, strict=True))
         turn = np.repeat(self.turn, len(points_of_pass), axis=0) if self.reads_turns else None
-        return pd.DataFrame(told).assign(
+        return pd.DataFrame(numbers).assign(
             trajectory="poses",
             time_s=np.tile(time, count),
             speed_mm_s=speed_mm_s,
@@ -97,16 +97,16 @@ def passes(measurements, mechanism):
 
     They go from one point of the box towards another, both of Sobol's sequence (Joe and Kuo, SIAM J. Sci. Comput. 30,
     2008), keep within the drives' ranges and clear of singularities. Of several targets the one that was read most is
-    read. None of a robot of several hands, and none where no target is on the platform.
+    read. None for a robot with several end effectors, and none where no target is on the platform.
     """
-    # it takes as long to load as some diagnoses, and few advise poses
+    # loading takes as long as some diagnoses, and few advise poses
     from scipy.stats import qmc
 
     used = measurements[rows.usable(measurements)]
     target, known = _target(used), rows.command(used)
     drives = rows.actuators(used, mechanism)
-    own = np.isfinite(known).all(axis=1) & np.isfinite(drives).all(axis=1)
-    known, drives = known[own], drives[own]
+    finite = np.isfinite(known).all(axis=1) & np.isfinite(drives).all(axis=1)
+    known, drives = known[finite], drives[finite]
     if mechanism.legs.hands or target is None or not len(known):
         return _none(mechanism)
     _, first = np.unique(known, axis=0, return_index=True)
@@ -150,19 +150,19 @@ def _target(used):
     if "target" not in used:
         return {}
     on_world = rows.on_the_world(used)
-    own = used if on_world is None else used[~on_world]
-    if not len(own):
+    on_robot = used if on_world is None else used[~on_world]
+    if not len(on_robot):
         return None
-    row = own[own["target"] == own["target"].mode().iloc[0]].iloc[0]
+    row = on_robot[on_robot["target"] == on_robot["target"].mode().iloc[0]].iloc[0]
     names = ("target", "target_on", *(f"target_{axis}_mm" for axis in "xyz"))
-    return {name: row[name] for name in names if name in own}
+    return {name: row[name] for name in names if name in on_robot}
 
 
 def _oriented(start_mm, end_mm, known, mechanism):
-    """Orientations (n, 3, 3) of passes, those commanded next to their starts, and actuator values (n p, K) within the
-    drives' ranges that bring the platform there, from those of the same pose on; NaN out of reach.
+    """Orientations (n, 3, 3) of passes, and actuator values (n p, K) within the drives' ranges that reach them.
 
-    known: positions (m, 3) and actuator values (m, K) that were commanded.
+    The orientations are those commanded next to the starts. The solution begins at the drive values of the same pose;
+    values are NaN out of reach. known: positions (m, 3) and actuator values (m, K) that were commanded.
     """
     from scipy.spatial import cKDTree
 
@@ -170,9 +170,10 @@ def _oriented(start_mm, end_mm, known, mechanism):
     turn = mechanism.solve(drives, position).turn
     fine = np.isfinite(turn).all(axis=(1, 2))
     nearest = np.flatnonzero(fine)[cKDTree(position[fine]).query(start_mm)[1]]
-    each = np.repeat(nearest, OPTIONS.points_per_pass)
-    place = points_of(start_mm, end_mm).reshape(-1, 3), turn[each]
-    reached = inverse_kinematics(mechanism, place, (drives[each], position[each]), mechanism.twists(), False)
+    at_points = np.repeat(nearest, OPTIONS.points_per_pass)
+    place = points_of(start_mm, end_mm).reshape(-1, 3), turn[at_points]
+    start = drives[at_points], position[at_points]
+    reached = inverse_kinematics(mechanism, place, start, mechanism.twists(), False)
     return turn[nearest], mechanism.in_range(reached)
 
 

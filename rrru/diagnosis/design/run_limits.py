@@ -1,4 +1,4 @@
-"""What a run that is proposed may ask of a robot: payload, speed and driving time, stated or derived from its file.
+"""Limits of proposed runs: payload, speed and driving time, stated or derived from the robot's file.
 
 Payloads in kg, speeds of the tool in mm/s, times in s.
 """

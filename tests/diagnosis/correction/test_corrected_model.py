@@ -140,7 +140,7 @@ def test_what_a_urdf_cannot_hold_is_named_and_left_in_its_gap(arm):
 
 @pytest.mark.parametrize("name", ["hexapod", "arm"])
 def test_corrected_drives_bring_the_measured_robot_to_where_it_is_commanded(name, request):
-    """Its true errors and effects, those of the law of play included, driven there from either side."""
+    """Its true errors and effects, backlash included, driven there from either side."""
     campaign = request.getfixturevalue(name)
     table, robot = campaign.found.tables["corrected_drives"], campaign.robot
     (schema,) = (one for one in tables_of(robot) if one.name == "corrected_drives")
@@ -210,9 +210,15 @@ def attached(tmp_path_factory):
         columns = rows.vector_columns("command", tool) | rows.vector_columns("measured", seen)
         columns |= dict(zip(given.parts.columns, drive.T, strict=True))
         columns |= {f"target_{axis}_mm": value for axis, value in zip("xyz", place, strict=True)}
-        told = {"run": number, "trajectory": name, "point": np.arange(1, len(tool) + 1), "target": name, "status": "ok"}
+        numbers = {
+            "run": number,
+            "trajectory": name,
+            "point": np.arange(1, len(tool) + 1),
+            "target": name,
+            "status": "ok",
+        }
         timed = {"time_s": 5.0 * np.arange(len(tool)) + 1e4 * number, "speed_mm_s": np.nan, "payload_kg": 0.0}
-        tables_read.append(pd.DataFrame(columns | told | timed))
+        tables_read.append(pd.DataFrame(columns | numbers | timed))
     frame = pd.concat(tables_read, ignore_index=True)
     robot = given.reading(rows.reads(frame, _STATED_MM)).seen_at(
         rows.actuators(frame, given), rows.command(frame), rows.readings(frame, given.angle_arm_mm)
@@ -258,7 +264,7 @@ def test_a_file_that_is_no_better_than_the_one_that_came_is_not_offered(attached
     worse.loc[worse["kind"] == "corrected_model", "rms_mm"] = 1.0
     monkeypatch.setattr(corrected_model, "gap_rows", lambda *_: (worse, ""))
     again = write_corrected(found, section, _MASSES, tmp_path / "corrected.xml")
-    assert "it would miss by 1 mm rms, the file as it came misses by 0.4" in again.verdict["not_in_model"]
+    assert "its residual error would be 1 mm rms, that of the file as it came is 0.4" in again.verdict["not_in_model"]
     assert ElementTree.parse(tmp_path / "corrected.xml").getroot().find("worldbody") is None
 
 
@@ -282,7 +288,7 @@ def test_a_file_that_is_worse_than_the_calibration_says_so_in_the_headline(attac
     assert again["file_error_mm"] > 0.2 < again["file_error_fresh_mm"]
     first, cannot = again["file_headline"].split("; it cannot hold: ")
     assert re.fullmatch(
-        r"the corrected file misses the readings by 0\.\d+ mm rms, the calibration by 0\.00\d mm", first
+        r"the corrected file has a residual error of 0\.\d+ mm rms, the calibration one of 0\.00\d mm", first
     )
     assert cannot.startswith("ball1 y: the axes of a ball joint meet in a point, ") and cannot.endswith(" more")
     assert again["file_remainder"].startswith("this file leaves 0.") and again["notes"] == ""

@@ -1,4 +1,4 @@
-"""Between which answers a run should decide: groups, the doubtful cause that matters most, then rivals."""
+"""Between which answers a run should decide: groups, the uncertain cause that matters most, then rivals."""
 
 import numpy as np
 import pytest
@@ -23,8 +23,8 @@ class _Attribution:
 
 
 def _contests(sets, sizes=None, **verdict):
-    told = {"effects": (), "unexplained": False, "probability": 0.5, "leg": 0, "possible": (), "rivals": ()}
-    return contests_of(_Attribution(sets), Verdict(**(told | verdict)), sizes or {})
+    defaults = {"effects": (), "unexplained": False, "probability": 0.5, "leg": 0, "possible": (), "rivals": ()}
+    return contests_of(_Attribution(sets), Verdict(**(defaults | verdict)), sizes or {})
 
 
 def _names(contest):
@@ -53,7 +53,7 @@ def test_a_member_whose_exact_set_was_never_weighed_stands_with_the_best_set_tha
 @pytest.mark.parametrize(
     ("sizes", "first"), [({"b": 0.3, "d": 0.1}, "a+b / a+e"), ({"b": 0.1, "d": 0.3}, "a+b / a+b+d")]
 )
-def test_the_doubtful_cause_that_makes_most_of_the_gap_comes_before_nearer_rivals(sizes, first):
+def test_the_uncertain_cause_that_makes_most_of_the_gap_comes_before_nearer_rivals(sizes, first):
     """Without a cause that is named its rival is what is then the most probable."""
     sets = {("a", "b"): 0.5, ("a", "b", "d"): 0.15, ("a",): 0.1, ("a", "e"): 0.25}
     rivals = ((frozenset("ae"), False, 0.25), (frozenset("a"), False, 0.1))
@@ -66,7 +66,7 @@ def test_the_answer_with_more_effects_makes_the_data():
     assert contest.separates == "a / a+b" and _names(contest) == [{"a", "b"}, {"a"}]
 
 
-def test_beside_something_unexplained_a_group_alone_is_contested():
+def test_with_something_unexplained_a_group_alone_is_contested():
     sets = {("a", "b"): 0.5, ("a", "c"): 0.4, ("a",): 0.1}
     found = _contests(sets, effects=("a", "b"), unexplained=True, groups=(Group(("b", "c"), 0.9),), possible=("none",))
     assert [one.separates for one in found] == ["a+b / a+c"]

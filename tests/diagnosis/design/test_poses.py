@@ -1,4 +1,4 @@
-"""Expected information against least squares and brute force, and poses that tell what no trajectory does."""
+"""Expected information against least squares and brute force, and poses more informative than any trajectory."""
 
 from dataclasses import dataclass
 from itertools import combinations, pairwise
@@ -28,7 +28,7 @@ from rrru.parameters import ParameterSet
 from rrru.robots.hexapod import hexapod
 from rrru.studies.setup import as_measured
 from tests.diagnosis import arms, hexapod_stops
-from tests.diagnosis.campaigns import EFFECTS, LINES, MASSES, SIM, case_of, measure, plan_of, strong
+from tests.diagnosis.campaigns import EFFECTS, LINES, MASSES, MODEL, case_of, measure, plan_of, strong
 
 _NOISE_MM = 0.02
 
@@ -49,7 +49,7 @@ def _left(parts):
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_each_pose_is_the_best_one_beside_those_before_it(seed):
+def test_each_pose_is_the_best_one_after_those_before_it(seed):
     first, *others = _candidates(seed)
     chosen, gain = greedy(Sums.of(*first, _NOISE_MM), [Sums.of(*one, _NOISE_MM) for one in others], 3)
     taken = [first]
@@ -66,28 +66,28 @@ def test_further_points_never_take_information_away():
     first, *others = _candidates(9, 200)
     now = Sums.of(*first, _NOISE_MM)
     assert min((now + Sums.of(*one, _NOISE_MM)).nats() for one in others) >= now.nats()
-    # what the design itself can make tells nothing
+    # data that the design itself can fit have no information
     made = others[0][0], others[0][0] @ np.ones(4)
     assert (Sums.of(*made, _NOISE_MM) + Sums.of(*made, _NOISE_MM)).nats() == pytest.approx(0.0, abs=1e-6)
 
 
 def test_passes_lie_between_measured_points_within_reach():
     frame = measure(plan=plan_of(trajectories=LINES[1:]))
-    passes = poses.passes(frame, SIM)
+    passes = poses.passes(frame, MODEL)
     start, end = passes.start_mm, passes.end_mm
     points = poses.points_of(start, end).reshape(-1, 3)
     known = frame[[f"command_{axis}_mm" for axis in "xyz"]].to_numpy()
-    assert len(start) > 20 and np.isfinite(SIM.inverse(points)).all()
+    assert len(start) > 20 and np.isfinite(MODEL.inverse(points)).all()
     assert (points >= known.min(axis=0) - 1e-9).all() and (points <= known.max(axis=0) + 1e-9).all()
     np.testing.assert_allclose(np.linalg.norm(end - start, axis=1), OPTIONS.pass_length_mm)
-    near, *_ = SIM.singularities(points, SIM.inverse(points))
-    own, *_ = SIM.singularities(known, SIM.inverse(known))
+    near, *_ = MODEL.singularities(points, MODEL.inverse(points))
+    own, *_ = MODEL.singularities(known, MODEL.inverse(known))
     assert near.min() > 0.75 * own.min()
 
 
 @dataclass(frozen=True)
 class LocalCompliance:
-    """A drive that gives way as `drive_compliance` does, but not in the middle between two lines."""
+    """A drive with the compliance of `drive_compliance`, but not in the middle between two lines."""
 
     name: str = "local_compliance"
     parameters: ParameterSet = EFFECTS["drive_compliance"].parameters
@@ -109,11 +109,11 @@ def rivals():
     case = case_of(measure((strong("drive_compliance", 6.0),), plan=plan_of(trajectories=LINES[1:])), library)
     calibrated = calibrate(case)
     evidence = case.evidence(case.linearise(calibrated))
-    beliefs = explore(evidence, Prior())
+    posterior = explore(evidence, Prior())
     found = InferenceResult(
-        case, calibrated, calibrated, fit_model(case, [calibrated]), evidence, beliefs, *beliefs.best()
+        case, calibrated, calibrated, fit_model(case, [calibrated]), evidence, posterior, *posterior.best()
     )
-    verdict = decide(beliefs, library)
+    verdict = decide(posterior, library)
     assert {*verdict.effects, *verdict.confusable_with} >= set(library) and verdict.probability < 0.6
     return found, verdict
 
@@ -148,7 +148,7 @@ def test_poses_tell_what_no_trajectory_does(between):
 
 @dataclass(frozen=True)
 class ComplianceOutside:
-    """A drive of an arm that gives way as `drive_compliance` does, but not within 150 mm of the plane y = 0."""
+    """A drive of an arm with the compliance of `drive_compliance`, but not within 150 mm of the plane y = 0."""
 
     name: str = "compliance_outside"
     parameters: ParameterSet = find("drive_compliance", arms.ARM).parameters
@@ -194,9 +194,9 @@ def test_poses_are_advised_for_an_arm_with_the_orientation_to_command():
     case = arms.case_of(frame, library=library)
     calibrated = calibrate(case)
     evidence = case.evidence(case.linearise(calibrated))
-    beliefs = explore(evidence, Prior())
+    posterior = explore(evidence, Prior())
     found = InferenceResult(
-        case, calibrated, calibrated, fit_model(case, [calibrated]), evidence, beliefs, *beliefs.best()
+        case, calibrated, calibrated, fit_model(case, [calibrated]), evidence, posterior, *posterior.best()
     )
     rivals = ((frozenset(["compliance_outside"]), False, 0.4),)
     verdict = Verdict(("drive_compliance",), False, 0.5, 0, ("compliance_outside",), rivals)
@@ -229,7 +229,7 @@ def test_of_several_targets_the_one_that_was_read_most_is_read_at_a_pose(tmp_pat
 
 
 def test_poses_are_as_many_as_the_time_allows():
-    passes = poses.passes(measure(plan=plan_of(trajectories=LINES[1:])), SIM)
+    passes = poses.passes(measure(plan=plan_of(trajectories=LINES[1:])), MODEL)
     order = [3, 0, 5, 1]
     way = [np.linalg.norm(passes.start_mm[b] - passes.end_mm[a]) for a, b in pairwise(order)]
     seconds = np.cumsum([200.0, *(200.0 + one for one in way)]) / 50.0
@@ -260,4 +260,4 @@ def test_a_box_smaller_than_a_pass_has_none():
     frame = measure(plan=plan_of(trajectories=LINES[1:]))
     known = frame[[f"command_{axis}_mm" for axis in "xyz"]].to_numpy()
     near = frame[np.abs(known - known[0]).max(axis=1) < 0.5 * OPTIONS.pass_length_mm / np.sqrt(3.0)]
-    assert len(near) > 1 and len(poses.passes(near, SIM)) == 0
+    assert len(near) > 1 and len(poses.passes(near, MODEL)) == 0

@@ -36,12 +36,12 @@ class Claim:
 
 # kinds of sentences of the answer
 _SENTENCES = {
-    "the robot still misses by": rf"After calibration the robot still misses by {_X} mm at points left out of it .*",
-    "nothing systematic is left": rf"After calibration nothing systematic is left .*\(probability {_P}\): the robot "
-    rf"misses by {_X} mm, the measuring noise is {_Y} mm\.",
+    "the robot still misses by": rf"After calibration the residual error is {_X} mm at points left out of it .*",
+    "nothing systematic is left": rf"After calibration these data show no systematic error \(probability {_P}\): "
+    rf"the residual error is {_X} mm, the measuring noise is {_Y} mm\.",
     "no cause is named": r"No cause is named: .*\.",
     "what to check": r"Next: check units, signs and order of the drives, .*",
-    "the corrected file is worse": r"The corrected file misses the readings by .*",
+    "the corrected file is worse": r"The corrected file has a residual error of .*",
     "a cause with a share": rf"{_SHARE} is {_CAUSE}",
     "a cause with a size": rf"{_X} mm is {_CAUSE}",
     "a cause without a share": rf"Also there is {_CAUSE}",
@@ -58,7 +58,8 @@ _SENTENCES = {
     rf"answer: {_P}\.",
     "it does not repeat": rf"(?:{_SHARE}|Some of it) does not repeat from pass to pass.*",
     "it is random error": rf"(?:{_SHARE}|Some of it) is random error above the stated noise.*",
-    "what is left with it": rf"Add (?:it|them) to the simulator and {_X} mm is left on runs .*; the noise is {_Y} mm\.",
+    "what is left with it": rf"With (?:it|them) in the simulator the residual error on left-out runs is {_X} mm; "
+    rf"the noise is {_Y} mm\.",
     "these data cannot rule out": r"(?:These data cannot rule out|Parts of it could be): (?P<names>.*)\.",
     "next, a run": r"Next: (?:drive|measure) (?P<run>.*)\. That (?:decides|would help to decide) "
     r"(?P<contest>.*)\.",
@@ -87,12 +88,13 @@ _NOTES = {
     "repeatability is unknown": r"repeatability is unknown: no pose was measured twice",
     "an effect needs what is not there": r"(?P<name>\w+) not tested: needs (?P<needs>[\w, ]+), which the columns .*",
     "an effect needs different values": r"(?P<name>\w+) not tested: needs (?P<needs>[\w, ]+) of more than one value",
-    "an effect is a calibration's number": r"(?P<name>\w+) not tested: the calibration's own parameters take it up",
-    "an effect is absorbed": r"(?P<name>\w+) not tested: the calibration takes it up entirely on these points",
+    "an effect is a calibration's number": r"(?P<name>\w+) not tested: the calibration's own parameters absorb it",
+    "an effect is absorbed": r"(?P<name>\w+) not tested: cannot be separated from the geometric .*",
     "an effect is not tested": r"(?P<name>\w+) not tested: .*",
     "runs are limited": r"no run with a payload is proposed, .*|runs are proposed within the limits .*",
     "the file leaves": rf"the corrected file leaves {_X} mm rms at the readings, the diagnosis {_Y} mm",
-    "the file would be worse": rf"not corrected: it would miss by {_X} mm rms, the file as it came misses by {_Y} mm",
+    "the file would be worse": rf"not corrected: its residual error would be {_X} mm rms, that of the file as it "
+    rf"came is {_Y} mm",
     "the file is not corrected": r"not corrected: .*",
     "how the file was driven": r"corrected model not driven: .*",
     "a part of a sentence": r"closed at its drive values instead|allowed: .*|corrected_drives holds all .*"
