@@ -1,4 +1,4 @@
-"""How a robot moved from one measured point to the next, as far as a campaign states it with its key `motion`."""
+"""Motion from one measured point to the next, as far as a campaign states it with its key `motion`."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -58,7 +58,7 @@ class StatedMotion:
 
 
 def stated_motion(measurements: pd.DataFrame) -> StatedMotion | None:
-    """What the columns of a measurement table state, None where they are not there."""
+    """Motion stated by the columns of a measurement table, None where they are missing."""
     if "motion" not in measurements or not len(measurements):
         return None
     first = measurements.iloc[0]

@@ -58,7 +58,7 @@ def for_robot(robot):
 
 
 def _driven(robot, member):
-    """Whether a drive does nothing but make a member, of these sites, longer."""
+    """Whether a drive only lengthens a member of these sites."""
     nothing = np.zeros(6)
     lengthened = {site: unit_twist(0) for site in member}
     return any(

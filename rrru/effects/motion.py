@@ -11,7 +11,7 @@ from rrru.kinematics.dynamics import drive_rates, load_slopes, loads
 
 @dataclass(frozen=True)
 class Course:
-    """What a robot is commanded to do at n points, NaN where it is unknown.
+    """Commanded motion at n points, NaN where it is unknown.
 
     position_mm, velocity_mm_s, acceleration_mm_s2: (n, 3), drive (n, K); path_drive (N, K): actuator values along
     everything that is driven, with rows path_index (n,); time_s, payload_kg: (n,); drive_motion: first and second
@@ -95,7 +95,7 @@ def standing(robot, sent, posed, turned=True):
 
 
 def last_move(drive, stop):
-    """How far drives (n, K) went to each row's stop from the one before, NaN at the first; stop (n,): never falling."""
+    """Travel of the drives (n, K) to each row's stop from the one before, NaN at the first; stop (n,) ascending."""
     values, number = np.asarray(drive, dtype=float), np.unique(stop, return_inverse=True)[1]
     at_stop = values[np.unique(number, return_index=True)[1]]
     return np.concatenate([np.full((1, values.shape[1]), np.nan), np.diff(at_stop, axis=0)])[number]

@@ -26,7 +26,7 @@ PATH = "path_drive"
 
 @dataclass(frozen=True)
 class Contribution:
-    """What one effect changes at the n points: twists (n or 1, sites, 6) at the robot's sites, or 0 for nothing.
+    """Contribution of one effect at the n points: twists (n or 1, sites, 6) at the robot's sites, or 0 for nothing.
 
     A twist is a shift in mm and a rotation vector in rad, in the site's own frame; see `rrru.kinematics.legs`.
     """
@@ -42,7 +42,7 @@ class Contribution:
 
 @dataclass(frozen=True)
 class Motion:
-    """What a robot does at the n sampled points, as far as an effect may need it; NaN where it is unknown.
+    """State of a robot at the n sampled points, as far as an effect may need it; NaN where unknown.
 
     robot: with its sites and parts; position_mm (n, 3): commanded positions; drive, drive_rate, drive_acceleration (n,
     K): commanded actuator values, angles in rad or lengths in mm, and their derivatives by the time; path_drive (N, K):
@@ -166,7 +166,7 @@ class Search:
 
 @dataclass(frozen=True)
 class Coordinates:
-    """How the diagnosis fits an effect model: c coordinates in which its contribution is linear, or nearly so.
+    """Parametrization of an effect model: c coordinates in which its contribution is linear, or nearly so.
 
     typical (c,): prior s.d., the sizes that a worn or badly assembled robot may have; most (c,): upper bounds of the
     sizes; legs (c,): number of the leg or drive from 1 on, 0 where the coordinate acts on all; positive (c,): whether

@@ -29,7 +29,7 @@ _RIDGE = 1e-14
 
 @dataclass(frozen=True)
 class SearchEnd:
-    """How a search ended.
+    """Result of a search.
 
     converged: at a minimum; straight: every step was accepted as it was; message: in words; cost: the objective;
     evaluations: of the model.
@@ -97,7 +97,7 @@ class Estimate:
 
     @property
     def rank(self) -> int:
-        """How many combinations of parameters the readings determine better than the prior."""
+        """Number of combinations of parameters that the readings determine better than the prior."""
         return int((self.singular_values > _AS_PRIOR).sum())
 
     @property

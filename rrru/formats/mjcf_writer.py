@@ -50,7 +50,7 @@ def to_mjcf(path, platform, found, folder):
 
 
 def measured_tool_mm(path):
-    """Where a file written by `to_mjcf` has the measured point on its platform (3,), None where that was not found."""
+    """Measured point (3,) on the platform of a file written by `to_mjcf`, None where it has none."""
     site = mujoco.MjSpec.from_file(str(path)).site(MEASURED_TOOL)
     return None if site is None else MM * np.array(site.pos)
 

@@ -1,4 +1,4 @@
-"""How many individuals of each island survive, are crossed, mutate and migrate, and how far (MATLAB `ga`)."""
+"""Plan of an evolution: elites, crossover children, mutants and migrants of each island (MATLAB `ga`)."""
 
 import math
 from typing import NamedTuple

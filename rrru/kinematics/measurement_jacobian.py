@@ -1,4 +1,4 @@
-"""Measurement Jacobian: Readings of reflectors and orientations by small twists anywhere in a robot."""
+"""Measurement Jacobian: readings of reflectors and orientations by small twists anywhere in a robot."""
 
 from functools import cached_property
 
@@ -102,5 +102,5 @@ class ReadingMap(TwistMap):
 
     @cached_property
     def _slope(self):
-        """How the rotation vectors that are lacking change with the model's turn, (k, 3, 3)."""
+        """Derivatives (k, 3, 3) of the residual rotation vectors with respect to the model's turn."""
         return slope_of_turns(turn_lacking(self._robot, self._readings, self.poses, self._at))

@@ -21,7 +21,7 @@ _EYE = np.eye(3)
 
 @dataclass(frozen=True, eq=False)
 class Readings:
-    """What was read at n poses.
+    """Readings at n poses.
 
     position_mm (n, 3); reflectors (n,): names of the sites of the reflectors read, and place_mm (n, 3): where on the
     platform they nominally sit, None where the tool itself was read; turn (n, 3, 3): orientations of the platform, NaN
@@ -41,7 +41,7 @@ class Readings:
 
     @property
     def plain(self):
-        """Whether nothing but positions of the tool was read."""
+        """Whether only positions of the tool were read."""
         return self.reflectors is None and self.turn is None
 
     @cached_property

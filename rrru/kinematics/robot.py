@@ -228,7 +228,7 @@ class Robot(ABC):
         return self.map_at(actuators, position_mm, deviations).columns(self.directions)
 
     def singularities(self, position_mm, actuators):
-        """How far poses are from singularities: translational measure, constraint measure and determinant, each (n,).
+        """Distance of poses from singularities: translational measure, constraint measure and determinant, each (n,).
 
         The constraint measure is the smallest singular value of the legs' unit wrenches, lengths counted in the robot's
         angle_arm_mm, 0 where the platform can move with locked drives; the translational one that of the drives'

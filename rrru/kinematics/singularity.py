@@ -1,4 +1,4 @@
-"""How far a mechanism is from its two kinds of singularity.
+"""Distance of a mechanism from its two kinds of singularity.
 
 A locked drive lets leg i move the platform only across g_i, the unit gradient of its closure, and keeps it from turning
 about b_i, its constraint moment. The rows g_i make the translational measure, the rows b_i the constraint measure:

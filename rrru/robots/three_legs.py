@@ -18,7 +18,7 @@ from rrru.parameters import LEGS, Parameter, ParameterSet
 
 @dataclass(frozen=True)
 class Deviation:
-    """How a parameter changes the legs' numbers: by a factor, in a column of one leg (1 to 3) or of all (0).
+    """Change of the legs' numbers by a parameter: by a factor, in a column of one leg (1 to 3) or of all (0).
 
     share: its bound, as a share of the robot's limit for angles or lengths; site: where it acts and on which component
     of the twist, where that is not its column's site.

@@ -14,7 +14,7 @@ from rrru.kinematics.robot import into_frame
 
 @dataclass(frozen=True)
 class Sees:
-    """What the tracker reads besides the tool's position.
+    """Readings of the tracker besides the tool's position.
 
     targets: places (3,) in mm of reflectors on the platform by name, seen one after the other at every point instead of
     the tool; noise_rad: noise of the orientations that it reads, one sigma per axis, None where it reads none.
@@ -25,7 +25,7 @@ class Sees:
 
     @property
     def only_tool(self):
-        """Whether it reads nothing but the tool's position."""
+        """Whether it reads only the tool's position."""
         return not self.targets and self.noise_rad is None
 
     def rows(self, count):

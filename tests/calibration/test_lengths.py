@@ -129,7 +129,7 @@ def test_evidence_counts_smooth_errors_as_no_proof():
 
 
 def test_bad_readings_are_found_where_rows_have_one_to_spare():
-    """Cauchy's loss trusts any three of four belts: the fourth's gross error is told from the others' rows."""
+    """Cauchy's loss fits any three of four belts: other rows decide that the fourth has the gross error."""
     lengths, anchors, _ = machine(13, noise_mm=0.2)
     counted = lengths.counted.copy()
     counted[[2, 9, 21], [0, 3, 1]] += [250.0, -90.0, 40.0]

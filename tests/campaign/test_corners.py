@@ -20,8 +20,8 @@ def _along(ends, count):
 
 def _table(command, time=np.nan):
     """A measurement table of one run."""
-    told = {f"command_{axis}_mm": column for axis, column in zip("xyz", command.T, strict=True)}
-    return pd.DataFrame(told | {"run": 1, "time_s": time})
+    columns = {f"command_{axis}_mm": column for axis, column in zip("xyz", command.T, strict=True)}
+    return pd.DataFrame(columns | {"run": 1, "time_s": time})
 
 
 def _farthest_from_lines(path, command):
@@ -36,8 +36,8 @@ def _farthest_from_lines(path, command):
 def test_a_rectangle_driven_in_one_run_stays_a_rectangle(degree, count, turned):
     turn = np.array([[np.cos(turned), -np.sin(turned)], [np.sin(turned), np.cos(turned)]])
     command = _along(_AROUND @ turn.T, count)
-    path, told = driven_path(_table(command), degree)
-    np.testing.assert_array_equal(path[told["path_index"]], command)
+    path, course = driven_path(_table(command), degree)
+    np.testing.assert_array_equal(path[course["path_index"]], command)
     assert _farthest_from_lines(path, command) < 1.0
     # a drive along one side stands still on the next one
     if not turned:
@@ -51,8 +51,8 @@ def test_rows_driven_to_and_fro_in_one_run_stay_rows(degree, count):
     """A grid of rows: from one to the next it is a single step."""
     rows = [_along([[0.0, y], [300.0, y]], count)[:: 1 - 2 * (k % 2)] for k, y in enumerate((0.0, 40.0, 80.0, 120.0))]
     command = np.concatenate(rows)
-    path, told = driven_path(_table(command), degree)
-    np.testing.assert_array_equal(path[told["path_index"]], command)
+    path, course = driven_path(_table(command), degree)
+    np.testing.assert_array_equal(path[course["path_index"]], command)
     assert _farthest_from_lines(path, command) < 1.0
     # what drives along y stands still in every row
     along = slice((count + 1) * STEPS, (2 * count + 1) * STEPS + 1)
@@ -101,8 +101,8 @@ def test_straight_parts_before_and_after_an_arc_stay_straight(steps):
         np.stack([-way, np.full(8, radius)], axis=1),
     )
     command = np.pad(np.concatenate(parts), [(0, 0), (0, 1)])
-    path, told = driven_path(_table(command))
-    first, last = told["path_index"][[7, -8]]
+    path, course = driven_path(_table(command))
+    first, last = course["path_index"][[7, -8]]
     np.testing.assert_allclose(path[: first + 1, 0], radius, atol=0.15)
     np.testing.assert_allclose(path[last:, 1], radius, atol=0.15)
     # an arc of one step is its chord
@@ -115,8 +115,8 @@ def test_a_corner_that_no_point_lies_at_leaves_the_sides_straight(cut):
     side = 40.0 * np.arange(10)
     first = np.stack([side - side[-1] - cut * 40.0, 0.0 * side], axis=1)
     second = np.stack([0.0 * side, side + (1.0 - cut) * 40.0], axis=1)
-    path, told = driven_path(_table(np.pad(np.concatenate([first, second]), [(0, 0), (0, 1)])))
-    last, begin = told["path_index"][[9, 10]]
+    path, course = driven_path(_table(np.pad(np.concatenate([first, second]), [(0, 0), (0, 1)])))
+    last, begin = course["path_index"][[9, 10]]
     np.testing.assert_allclose(path[: last + 1, 1], 0.0, atol=0.15)
     np.testing.assert_allclose(path[begin:, 0], 0.0, atol=0.15)
 
@@ -130,8 +130,8 @@ def test_speeds_at_a_corner_where_the_robot_rests_are_those_of_rest():
     second = np.outer(side, command[20] - command[10]) + command[10]
     command = np.concatenate([first, second[1:]])
     time = np.concatenate([share, np.pi + share[1:]])
-    _, told = driven_path(_table(command, time))
-    speed = np.linalg.norm(told["velocity_mm_s"], axis=1)
+    _, course = driven_path(_table(command, time))
+    speed = np.linalg.norm(course["velocity_mm_s"], axis=1)
     expected = np.concatenate([300.0 * np.sin(share), 200.0 * np.sin(share[1:])]) / 2.0
     np.testing.assert_allclose(speed, expected, atol=1.0)
 
@@ -139,9 +139,9 @@ def test_speeds_at_a_corner_where_the_robot_rests_are_those_of_rest():
 def test_drives_have_a_corner_where_the_path_of_the_tool_has_one():
     command = _along(_AROUND[:3], 10)
     frame = _table(command)
-    path, told = driven_path(frame)
+    path, course = driven_path(frame)
     # drives of which each moves the tool along an axis
     drives = np.full_like(path, np.nan)
-    drives[told["path_index"]] = 0.01 * command
-    smooth = smooth_drives(frame, drives, told["path_index"])
+    drives[course["path_index"]] = 0.01 * command
+    smooth = smooth_drives(frame, drives, course["path_index"])
     np.testing.assert_allclose(smooth, 0.01 * path, atol=1e-12)

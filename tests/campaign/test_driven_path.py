@@ -19,8 +19,8 @@ def _campaign(at, command):
     """A measurement table of one run each way, through points at `at` (n,), and its drives (2 n, 2)."""
     drives = np.concatenate([_swing(at), _swing(at[::-1])])
     command = np.concatenate([command, command[::-1]])
-    told = {f"command_{axis}_mm": column for axis, column in zip("xyz", command.T, strict=True)}
-    return pd.DataFrame(told | {"run": np.repeat([1, 2], len(at))}), drives
+    columns = {f"command_{axis}_mm": column for axis, column in zip("xyz", command.T, strict=True)}
+    return pd.DataFrame(columns | {"run": np.repeat([1, 2], len(at))}), drives
 
 
 def _evenly(drives, index):

@@ -1,4 +1,4 @@
-"""Compensated backlash and repeatability, against the play itself and against numbers done by hand."""
+"""Compensated backlash and repeatability, against the play operator and against numbers done by hand."""
 
 import numpy as np
 import pandas as pd
@@ -18,7 +18,7 @@ def _wander(seed):
 
 @pytest.mark.parametrize("seed", range(4))
 def test_behind_the_play_the_slider_is_where_it_is_wanted(seed):
-    """Once the play is taken up, wherever the path turns; without the jumps it is half the play behind."""
+    """Once the backlash is crossed, wherever the path turns; without the jumps it is half the backlash behind."""
     wanted = _wander(seed)
     sent = compensated(wanted, WIDTHS)
     attained = sent + play(sent, 0.5 * WIDTHS)

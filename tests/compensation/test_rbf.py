@@ -50,7 +50,7 @@ def test_the_followed_error_is_that_of_the_network_with_so_many_neurons(curve):
 
 
 def test_with_all_neurons_it_is_the_gaussian_interpolator_of_scipy(curve):
-    """The threshold stands for one neuron; without it there is one sum of Gaussians through all points, which scipy
+    """The threshold replaces one neuron; without it there is one sum of Gaussians through all points, which scipy
     finds by itself.
     """
     points, targets = curve

@@ -10,7 +10,7 @@ from rrru.robots.rrru3 import Rrru3
 from rrru.simulation.virtual_robot import VirtualRobot
 
 ROBOT = Rrru3()
-# a robot along lines does not stop, and has no thermometer; laws of many waves have tests of their own
+# a robot along lines does not stop, and has no thermometer; effects of many waves have tests of their own
 ELSEWHERE = ("drive_error_function", "transmission_orders", "read_before_rest", "thermal_expansion")
 EFFECTS = {name: effect for name, effect in library(ROBOT).items() if name not in ELSEWHERE}
 SLIDER_EFFECTS = {name: effect for name, effect in library(Ptt3()).items() if name not in ELSEWHERE}

@@ -1,4 +1,4 @@
-"""A base that creeps against the instrument, and the laws of a campaign's circumstances, which have to be named."""
+"""A base that creeps against the instrument, and effects of a campaign's circumstances, which have to be named."""
 
 from dataclasses import replace
 
@@ -44,7 +44,7 @@ def test_the_first_point_in_time_is_the_start_whatever_its_row():
 
 
 def test_reflectors_beside_the_robot_and_on_it_move_alike():
-    """By one rigid motion of the instrument's world, which the map's columns foretell."""
+    """By one rigid motion of the instrument's world, which the Jacobian's columns predict."""
     places = {"on_tool": (60.0, 20.0, 110.0), "on_table": (500.0, -300.0, 0.0)}
     names, motion = list(places), _motion()
     count, sites = len(motion), [f"reflector {name}" for name in places]
@@ -52,9 +52,9 @@ def test_reflectors_beside_the_robot_and_on_it_move_alike():
     twists = EFFECT.contribute(replace(motion, robot=robot), _VALUES).twists
     poses = robot.solve(motion.drive, motion.position_mm)
     for name, site in zip(names, sites, strict=True):
-        beside = np.full(count, name == "on_table")
+        on_world = np.full(count, name == "on_table")
         readings = Readings(
-            motion.position_mm, np.full(count, site), np.tile(places[name], (count, 1)), None, 1.0, beside
+            motion.position_mm, np.full(count, site), np.tile(places[name], (count, 1)), None, 1.0, on_world
         )
         before = robot.measured(poses, np.zeros_like(twists), readings)
         moved = robot.measured(poses, twists, readings)

@@ -12,7 +12,7 @@ from tests.robots import two_arms
 
 COUNT = 20
 FOLLOWING = make_mechanism("two_arms", two_arms.section())
-HAND = np.array(["right", "left"] * COUNT)[:COUNT]
+ARM = np.array(["right", "left"] * COUNT)[:COUNT]
 DRIVES = FOLLOWING.legs.home_drives + np.random.default_rng(2).uniform(-0.5, 0.5, (COUNT, len(two_arms.DRIVES)))
 
 
@@ -33,7 +33,7 @@ def _motion(robot):
     values["chest"] = -(values["hip"] + values["belly"])
     drives = np.stack([values[column.removesuffix("_rad")] for column in robot.parts.columns], axis=1)
     still, rest, every = np.zeros((COUNT, 3)), np.zeros_like(drives), np.arange(COUNT)
-    position = robot.guess(drives, HAND)
+    position = robot.guess(drives, ARM)
     course = Course(position, drives, drives, every, every, still, still, np.zeros(COUNT), (rest, rest))
     return make_motion(robot, Masses(0.0, 0.0, 0.0), course)
 
@@ -45,7 +45,7 @@ def test_only_trunks_that_hands_share_have_the_law():
     assert len(names) == 6 and "cross_belly_chest" in names and not any("right" in name for name in names)
 
 
-def test_each_joint_gives_way_to_the_other_ones_torque():
+def test_each_joint_deflects_under_the_other_ones_torque():
     """Two joints, each by the load on the other: no more, no less, and with one number."""
     motion, effect = _motion(FREE), library(FREE)["cross_compliance"]
     twists = effect.contribute(motion, effect.parameters.vector({"cross_hip_chest": 2e-8})).twists

@@ -32,7 +32,7 @@ def test_backlash_parts_forward_and_reverse_by_its_width():
     assert both.sum() > 60
     gap = np.where(both, np.abs(there - back), np.nan)
     np.testing.assert_allclose(gap[both], np.broadcast_to(widths, gap.shape)[both], rtol=1e-6)
-    # half the play behind the direction of motion
+    # half the backlash behind the direction of motion
     direction = np.sign(np.diff(motion.drive, axis=0, prepend=np.nan))
     np.testing.assert_allclose(error[steady], (-0.5 * widths * direction)[steady], rtol=1e-6)
 
@@ -53,7 +53,7 @@ def test_backlash_moves_the_platform_through_the_jacobian():
 
 
 def test_backlash_repeats_with_the_path():
-    """Two rounds there and back: the second equals the first but for the points before the play was first used up."""
+    """Two rounds there and back: the second equals the first, except where the backlash was not yet crossed."""
     _, position, _ = drive({"backlash": per_leg("width", 0.002)}, plan_of(FORWARD, REVERSE, FORWARD, REVERSE))
     first, second, third, fourth = np.split(position, 4)
     np.testing.assert_allclose(second, fourth, atol=1e-12)

@@ -1,4 +1,4 @@
-"""Laws of many waves of the drives' own angles: their columns against differences, where they act, who has them."""
+"""Effects of many waves of the drives' own angles: columns against differences, sites, which robots have them."""
 
 from dataclasses import replace
 
@@ -30,7 +30,7 @@ _SOME = (0, 1, 2 * 6, 130, 128 + 2 * 30 + 1, 3 * 128 + 7, 6 * 128 - 1)
 
 
 def _law(name):
-    """The law of the arm, with its waves where these are to be found."""
+    """The effect of the arm, with its waves where these are to be found."""
     effect = find(name, arms.ARM)
     return effect.with_waves(WAVES) if name == SHARP else effect
 
@@ -109,8 +109,8 @@ def test_a_drive_that_others_follow_moves_them_too():
     robot = make_mechanism("two_arms", two_arms.section())
     count, names = 20, two_arms.DRIVES
     drive = robot.legs.home_drives + np.random.default_rng(2).uniform(-0.5, 0.5, (count, len(names)))
-    hand = np.array(["right", "left"] * count)[:count]
-    position, still, rest = robot.guess(drive, hand), np.zeros((count, 3)), np.zeros_like(drive)
+    arm = np.array(["right", "left"] * count)[:count]
+    position, still, rest = robot.guess(drive, arm), np.zeros((count, 3)), np.zeros_like(drive)
     course = Course(
         position, drive, drive, np.arange(count), np.arange(count), still, still, np.zeros(count), (rest, rest)
     )
@@ -123,7 +123,7 @@ def test_a_drive_that_others_follow_moves_them_too():
         made = at.move(effect.contribute(motion, np.eye(len(effect.parameters))[number]).twists)
         np.testing.assert_allclose(functions[k][:, 5, None] * at.drive_effect[:, :, k], made, rtol=0.0, atol=1e-6)
         h = 1e-5 * np.eye(len(names))[k]
-        moved = (robot.guess(drive + h, hand) - robot.guess(drive - h, hand)) / 2e-5
+        moved = (robot.guess(drive + h, arm) - robot.guess(drive - h, arm)) / 2e-5
         np.testing.assert_allclose(made, np.cos(3.0 * drive[:, k, None]) * moved, rtol=0.0, atol=1e-3)
 
 
@@ -145,9 +145,9 @@ def test_what_repeats_with_every_turn_and_what_does_not(motion):
 def test_a_law_without_waves_does_nothing_and_one_with_them_is_of_the_stated_drives(motion):
     nothing = find(SHARP, arms.ARM)
     assert len(nothing.coordinates) == 0 and not np.any(nothing.contribute(motion, []).twists)
-    told = nothing.with_waves(WAVES, -3.0)
-    assert [parameter.leg for parameter in told.parameters] == [1, 1, 5, 5, 1, 1, 6, 6]
-    assert len(set(told.parameters.names)) == 8 and told.coordinates.log_prior == -3.0
+    effect = nothing.with_waves(WAVES, -3.0)
+    assert [parameter.leg for parameter in effect.parameters] == [1, 1, 5, 5, 1, 1, 6, 6]
+    assert len(set(effect.parameters.names)) == 8 and effect.coordinates.log_prior == -3.0
 
 
 @pytest.mark.parametrize("name", [FUNCTION, SHARP])
@@ -174,7 +174,7 @@ def test_the_waves_of_a_slide_make_any_function_of_its_stroke(robot, stroke, mot
 
 @pytest.mark.parametrize("most", [6 * 2 * 64, 6 * 2 * 20 + 7, 48, 47])
 def test_few_readings_have_the_lower_orders(most, motion):
-    """No more coefficients than told, the same functions and sizes; nothing where fewer than four orders are left."""
+    """No more coefficients than asked for, the same functions and sizes; None for fewer than four orders."""
     whole, coarse = _law(FUNCTION), _law(FUNCTION).coarser(most)
     orders = most // 12
     assert (coarse is None) == (orders < 4)

@@ -1,4 +1,4 @@
-"""What all effects of the library have in common, and the laws of the first three by themselves."""
+"""Common properties of all effects of the library, and the models of the first three by themselves."""
 
 import numpy as np
 import pytest
@@ -128,7 +128,7 @@ def test_three_typical_sizes_lie_within_the_bounds(name):
 @settings(max_examples=15, deadline=None)
 @given(seed=st.integers(0, 2**32 - 1), factor=st.floats(0.1, 2.0))
 def test_contributions_are_linear_in_the_coordinates(name, seed, factor):
-    """Exactly for most; the foot's second order, the lag's, and the play at turn-backs are small."""
+    """Exactly for most; the second orders of foot and lag, and of the backlash at turn-backs, are small."""
     effect = EFFECTS[name]
     generator = np.random.default_rng(seed)
     typical = effect.coordinates.typical
@@ -234,7 +234,7 @@ def test_play_equals_its_definition_step_by_step():
 @settings(max_examples=50)
 @given(st.lists(st.floats(-10.0, 10.0), min_size=2, max_size=30), st.floats(0.0, 5.0))
 def test_play_stays_within_its_width_and_forgets_the_sampling(path, half):
-    """However slowly the path is driven, the arm ends at the same place, at most half the play off."""
+    """However slowly the path is driven, the arm ends at the same place, at most half the backlash off."""
     path = np.array(path)[:, None]
     change = play(path, np.array([half]))
     assert np.abs(change).max() <= half + 1e-12
@@ -243,7 +243,7 @@ def test_play_stays_within_its_width_and_forgets_the_sampling(path, half):
 
 
 def test_play_remembers_the_path_and_ignores_the_speed():
-    """A small turn-back inside the play does not move the arm; the same path at half the sampling gives the same
+    """A small turn-back inside the backlash does not move the arm; the same path at half the sampling gives the same
     end.
     """
     path = np.array([0.0, 5.0, 4.5, 4.8])[:, None]

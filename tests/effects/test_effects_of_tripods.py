@@ -1,4 +1,4 @@
-"""The laws of robots with sliders and of the Delta: what they have in common, their first order, and each against a
+"""Effect models of robots with sliders and of the Delta: what all have in common, their first order, and each against a
 slow reading of its docstring.
 """
 
@@ -27,7 +27,9 @@ ROBOTS = {
     "delta": (Delta(), 0.0),
 }
 SLIDERS = ("level", "sloped", "upright")
-LAWS = [(name, law) for name, (robot, _) in ROBOTS.items() for law in library(robot) if law not in ELSEWHERE]
+EFFECTS = [
+    (name, effect) for name, (robot, _) in ROBOTS.items() for effect in library(robot) if effect not in ELSEWHERE
+]
 
 
 def _motion(robot, height):
@@ -75,7 +77,7 @@ def test_a_delta_has_bars_in_pairs_and_three_drives_turn_no_platform():
     assert all(find("tool_offset", robot) is None for robot, _ in ROBOTS.values())
 
 
-@pytest.mark.parametrize(("robot", "name"), LAWS)
+@pytest.mark.parametrize(("robot", "name"), EFFECTS)
 def test_an_effect_says_what_it_is_and_is_nothing_at_its_nominal_parameters(name, robot):
     effect, motion = library(ROBOTS[robot][0])[name], MOTIONS[robot]
     assert effect.name == name and set(effect.needs) <= set(Motion.__dataclass_fields__)
@@ -88,7 +90,7 @@ def test_an_effect_says_what_it_is_and_is_nothing_at_its_nominal_parameters(name
     assert np.any(effect.contribute(motion, _values(effect)).twists)
 
 
-@pytest.mark.parametrize(("robot", "name"), LAWS)
+@pytest.mark.parametrize(("robot", "name"), EFFECTS)
 def test_the_first_order_is_the_exact_closures(name, robot):
     """The remainder shrinks with the square of the effect."""
     motion, mechanism = MOTIONS[robot], ROBOTS[robot][0]

@@ -1,4 +1,4 @@
-"""Wind-up against friction: its law against slow integrations, what it goes over into, and how it is told from play."""
+"""Wind-up against friction: the model against slow integrations, its limit, and how it is separated from backlash."""
 
 import numpy as np
 import pytest
@@ -103,7 +103,7 @@ def test_amplitudes_and_travel_of_a_drawn_robot_are_found():
 
 
 def test_it_holds_play_and_goes_with_it():
-    """Whoever rules play out must not get it back as wind-up over no travel."""
+    """Without backlash among the effects it must not reappear as wind-up over no travel."""
     assert GapSettings(("backlash", "friction_windup", "servo_lag")).without("backlash").effects == ("servo_lag",)
 
 
@@ -114,9 +114,9 @@ def test_play_stays_play_beside_it():
 
 
 def test_at_stops_far_apart_play_and_wind_up_stand_in_for_each_other():
-    """Every move there is many travels long: nothing tells them apart, and the answer says so."""
-    law = find("friction_windup", arms.ARM)
-    frame = arms.measure([arms.active("friction_windup", np.full(arms.DRIVES, 4e-4), {"travel_rad": 0.02}, law)])
+    """Every move there is many travels long: the two effects are confounded, and the answer states it."""
+    effect = find("friction_windup", arms.ARM)
+    frame = arms.measure([arms.active("friction_windup", np.full(arms.DRIVES, 4e-4), {"travel_rad": 0.02}, effect)])
     known = MeasuredRobot(arms.reading(frame), arms.MASSES, arms.NOISE_MM, noise_rad=arms.NOISE_RAD)
     found = diagnose(frame, known, GapSettings(("backlash", "friction_windup", "servo_lag")), details=False)
     named = {found.verdict["effects"], *found.verdict["confusable_with"].split(", ")}

@@ -1,4 +1,4 @@
-"""Effects by name: the library's, a user's own, and what is refused."""
+"""Effects by name: those of the library, user-defined ones, and refusals."""
 
 import sys
 

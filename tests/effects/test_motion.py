@@ -44,7 +44,7 @@ def test_the_virtual_robots_motion_is_the_plans():
 
 
 def test_rates_are_the_slopes_of_the_angles_in_time():
-    """Between two sampled points of a run the rates' mean is the angles' step, as far as the trapezoidal rule tells."""
+    """Between two sampled points of a run the rates' mean is the angles' step, up to the trapezoidal rule's error."""
     motion = VirtualRobot(ROBOT).motion(_PLAN, ROBOT.inverse)
     run = _PLAN.commands(ROBOT)["run"].to_numpy()
     inside = run[1:] == run[:-1]
@@ -97,7 +97,7 @@ def test_changes_at_the_drives_are_read_back(robot):
 
 
 def _course(robot, target):
-    """A Course along positions (n, 3) that nobody knows more about."""
+    """A Course along positions (n, 3) of which nothing else is known."""
     still, drive, n = np.zeros_like(target), robot.inverse(target), len(target)
     return Course(target, drive, drive, np.arange(n), np.zeros(n), still, still, np.zeros(n))
 
@@ -116,7 +116,7 @@ def test_shifts_along_a_group_act_at_each_of_its_sites():
 
 @pytest.mark.parametrize("turned", [False, True])
 def test_drive_values_bring_the_nominal_robot_to_where_it_stands(turned):
-    """A hexapod whose drives are off by a known amount: that is what is found, and the pose that it makes."""
+    """A hexapod with known errors of its drives: these and the resulting pose are found."""
     robot = make_mechanism("hexapod", {"mjcf": str(HEXAPOD), "platform": "plate"}, parameter_set="zero")
     place = robot.legs.home_mm + np.random.default_rng(2).uniform(-30.0, 30.0, (20, 3))
     drive, off = robot.inverse(place), np.array([0.5, -0.3, 0.2, 0.0, -0.6, 0.4])

@@ -1,4 +1,4 @@
-"""A pedestal that gives way to the robot's weight: the moment on it, its twist, and reflectors that stand on it."""
+"""A pedestal that deflects under the robot's weight: the moment on it, its twist, and reflectors that are on it."""
 
 from dataclasses import replace
 
@@ -81,11 +81,11 @@ def found(tmp_path_factory):
         at = np.tile(np.array(place), (len(driven), 1)) if name in _TABLE else poses.point(np.array(place))
         world = twists[:, 0]
         seen = frame.apply(Rotation.from_rotvec(world[:, 3:]).apply(at) + world[:, :3]) + shift
-        told = dict(zip(ARM.parts.columns, driven.T, strict=True)) | rows.vector_columns(
+        columns = dict(zip(ARM.parts.columns, driven.T, strict=True)) | rows.vector_columns(
             "measured", seen + 0.01 * generator.standard_normal(seen.shape)
         )
         parts.append(
-            pd.DataFrame({"trajectory": "poses", "target": name, "order": np.arange(100) * 9 + number, **told})
+            pd.DataFrame({"trajectory": "poses", "target": name, "order": np.arange(100) * 9 + number, **columns})
         )
     table = pd.concat(parts).sort_values("order").drop(columns="order").reset_index(drop=True)
     measured = [f"measured_{axis}_mm" for axis in "xyz"]

@@ -1,4 +1,4 @@
-"""Drives that were read before the arm stood still: the law, its place in a campaign of stops, and the diagnosis."""
+"""Drives that were read before the arm stood still: the effect model, a campaign of stops, and the diagnosis."""
 
 from dataclasses import replace
 
@@ -41,12 +41,12 @@ def _campaign(count, shares, exponent=0.0, noise_mm=0.02, seed=3):
     longest = np.maximum(np.abs(move).max(axis=1, keepdims=True), 1e-3)
     read = true - np.array([*shares.values()]) * move / longest**exponent
     command, position = ARM.forward(read), ARM.forward(true)
-    told = dict(zip(ARM.parts.columns, read.T, strict=True))
+    drives = dict(zip(ARM.parts.columns, read.T, strict=True))
     frame = pd.DataFrame({"run": 1, "trajectory": "poses", "point": np.arange(1, count + 1), "time_s": np.nan})
     measured = position + noise_mm * generator.standard_normal(position.shape)
     return frame.assign(
         **rows.vector_columns("command", command),
-        **told,
+        **drives,
         **rows.vector_columns("measured", measured),
         speed_mm_s=np.nan,
         payload_kg=np.nan,
@@ -79,10 +79,10 @@ def test_the_law_undoes_what_was_read_too_early(exponent):
 def test_rows_that_are_held_out_stay_stops():
     frame = _campaign(40, _SHARES)
     held = np.arange(40) % 3 == 1
-    kept = rows.hold_out(frame.assign(status=np.where(np.arange(40) == 4, "outlier", "ok")), held)
-    assert kept["status"].tolist()[:6] == ["ok", "held_out", "ok", "ok", "outlier", "ok"]
-    assert not rows.usable(kept)[held].any()
-    whole, part = _case(frame, "read_before_rest"), _case(kept, "read_before_rest")
+    marked = rows.hold_out(frame.assign(status=np.where(np.arange(40) == 4, "outlier", "ok")), held)
+    assert marked["status"].tolist()[:6] == ["ok", "held_out", "ok", "ok", "outlier", "ok"]
+    assert not rows.usable(marked)[held].any()
+    whole, part = _case(frame, "read_before_rest"), _case(marked, "read_before_rest")
     np.testing.assert_array_equal(whole.motion.last_move, part.motion.last_move)
     assert not part.used[held].any() and len(part.motion.drive) == 40
     torn = _case(frame[~held], "read_before_rest")
@@ -94,9 +94,9 @@ def test_what_is_passed_on_a_path_has_no_last_move():
     order = np.argsort(frame["q1_rad"].to_numpy())
     low, high = ARM.drive_range.T
     line = low + 0.1 + 0.5 * (high - low) * np.linspace(0.0, 1.0, 40)[:, None]
-    told = dict(zip(ARM.parts.columns, line.T, strict=True))
+    drives = dict(zip(ARM.parts.columns, line.T, strict=True))
     command = rows.vector_columns("command", ARM.forward(line))
-    case = _case(frame.iloc[order].assign(**told, **command), "read_before_rest", "drive_compliance")
+    case = _case(frame.iloc[order].assign(**drives, **command), "read_before_rest", "drive_compliance")
     assert "last_move" in case.untestable["read_before_rest"]
 
 

@@ -19,7 +19,7 @@ def test_robots_that_slide_have_it_and_others_do_not():
         [{"d_mm": 300, "a_mm": 200, "range_deg": [-90, 90]}, {"sliding": True, "range_mm": [0, 200]}], name="arm"
     )
     assert find("screw_growth", turning).parameters.names == ("low_strain2", "high_strain2", "time_constant")
-    # nobody states the range of these sliders
+    # the range of these sliders is not stated
     assert find("screw_growth", Ptt3()).parameters.names == (*(f"low_strain{k}" for k in (1, 2, 3)), "time_constant")
 
 

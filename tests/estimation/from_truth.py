@@ -1,4 +1,4 @@
-"""Where searches end, beside least squares by SciPy from the truth: the minimum that a solver has to find.
+"""Ends of searches, compared with least squares by SciPy from the truth: the minimum that a solver has to find.
 
 The measured positions are handed over in the instrument's frame. Lengths in mm, angles in rad.
 """
@@ -54,19 +54,19 @@ class Outcome:
 
 
 def unregistered_table(campaign):
-    """The measurement table of a RandomCampaign in the instrument's frame; nobody states a target's place."""
+    """The measurement table of a RandomCampaign in the instrument's frame; no target's place is stated."""
     table, count = campaign.sheet, len(campaign.targets)
     poses = campaign.robot.solve(campaign.actuators, campaign.position_mm)
     moved = np.abs(np.diff(campaign.actuators, axis=0)).max(axis=1) > 0.0
-    told = {"run": 1, "point": 1 + np.concatenate([[0], moved.cumsum()]), "status": "ok"}
+    labels = {"run": 1, "point": 1 + np.concatenate([[0], moved.cumsum()]), "status": "ok"}
     vectors = {"command": campaign.position_mm, "target": np.zeros((count, 3))}
     columns = {key: value for name, one in vectors.items() for key, value in rows.vector_columns(name, one).items()}
     nothing = dict.fromkeys(("time_s", "speed_mm_s", "payload_kg"), np.nan)
-    return table.assign(**told, **columns, **nothing, **rows.turn_columns("command", poses.turn))
+    return table.assign(**labels, **columns, **nothing, **rows.turn_columns("command", poses.turn))
 
 
 def case_of(campaign):
-    """The Case of a RandomCampaign, as a user's file comes to it but for ingest."""
+    """The DiagnosisProblem of a RandomCampaign, as of a user's file, without ingest."""
     table = unregistered_table(campaign)
     robot = sim(setup.as_measured(campaign.robot, table, registered=True))
     arm_mm = robot.angle_arm_mm if campaign.turn is not None else np.nan

@@ -21,7 +21,7 @@ def test_of_a_normal_distribution_it_is_two_standard_errors_to_both_sides():
 
 @pytest.mark.parametrize("mean", [-30.0, -2.0, -0.1])
 def test_at_a_bound_it_begins_there(mean):
-    """The density falls from the bound on: the shortest interval ends at the 95 % quantile of what is not cut off."""
+    """The density falls from the bound on: the shortest interval ends at the truncated density's 95 % quantile."""
     found = NormalMixture(_ONE, np.array([mean]), np.array([2.0])).interval(low=0.0)
     end = truncnorm(-mean / 2.0, np.inf, loc=mean, scale=2.0).ppf(0.95)
     assert found[0] == 0.0 and found[1] == pytest.approx(end, rel=0.01)

@@ -133,7 +133,7 @@ def test_a_direction_that_no_reading_sees_stays_at_its_prior_mean_and_is_named()
 
 
 def test_priors_leave_the_variance_of_what_the_readings_see_in_a_sum_only():
-    """Columns 1 and 4 are the same: the priors share out their sum, the readings tell the others."""
+    """Columns 1 and 4 are the same: the priors divide their sum, the readings determine the others."""
     problem, _ = _problem(3, bend=0.0, sd=0.5)
     problem.observations.matrix[:, 4] = problem.observations.matrix[:, 1]
     shares = solve(problem, [np.zeros(6)]).prior_shares

@@ -1,4 +1,4 @@
-"""Random robots whose frame and targets nobody knows: every search ends where least squares from the truth does."""
+"""Random robots with unknown frame and targets: every search ends where least squares from the truth does."""
 
 import numpy as np
 import pytest

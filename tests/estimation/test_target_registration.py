@@ -103,7 +103,7 @@ def test_orientations_give_the_turn_of_the_tool():
 
 
 def test_a_body_that_never_turns_has_its_targets_about_the_tool():
-    """Place and shift are confounded: the weak prior decides, nothing runs away."""
+    """Place and shift are confounded: the weak prior decides, nothing diverges."""
     readings, rotation, *_ = _measured(6, tilt_rad=0.0)
     found = register_targets(readings)
     assert Rotation.from_matrix(found.rotation @ rotation.T).magnitude() < 1e-3

@@ -62,7 +62,7 @@ def _fixed(xyz_mm, rpy_deg):
 
 
 def frames(drives):
-    """Placements (4, 4) in m of the eleven rows' frames and of the hand, at drive values (10,), by products."""
+    """Placements (4, 4) in m of the eleven rows' frames and of the tool, at drive values (10,), by products."""
     q = dict(zip(DRIVES, drives, strict=True))
     q["chest"] = -(q["torso1"] + q["torso2"])
     here, result = _fixed(*BASE), []

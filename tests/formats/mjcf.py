@@ -61,7 +61,7 @@ RRRU3_HOME = np.array([20.0, -30.0, 700.0])
 
 
 def rrru3_mjcf(tmp_path, robot):
-    """The 3-RRRU as bodies and hinges, zero where its own joints are, its three hands welded to the plate.
+    """The 3-RRRU as bodies and hinges, zero where its own joints are, the ends of its three legs welded to the plate.
 
     At RRRU3_HOME to a tenth of a micrometre and a microradian: the key's numbers are rounded.
     """

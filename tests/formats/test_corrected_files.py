@@ -151,7 +151,7 @@ def test_the_keyframe_is_closed_and_has_a_place_for_every_joint(tmp_path):
 
 
 def test_a_corrected_file_can_be_corrected_again(tmp_path):
-    """Its own anchors, play and frames are replaced, not doubled."""
+    """Its own anchors, backlash and frames are replaced, not doubled."""
     robot = from_mjcf(HEXAPOD, "plate")
     more = {"play": {2: (0.05, 1e-3)}, "loads": {2: 50.0}, "reflectors": {"ball": np.array([60.0, 0.0, 40.0])}}
     first, second = _drawn(robot, 8), _drawn(robot, 9)

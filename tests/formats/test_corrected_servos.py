@@ -1,4 +1,4 @@
-"""Drives in files that were written back: they give way, and turn back, as was found; what no file holds is said."""
+"""Drives in corrected files: compliance and lost motion as found; what a file cannot represent is reported."""
 
 from itertools import pairwise
 
@@ -16,7 +16,7 @@ from rrru.kinematics.point_masses import driven_loads
 from tests.formats.mjcf import ARM, GEOM, HEXAPOD, file_of, mjcf, servos
 
 
-def test_a_servo_gives_way_by_its_load_over_the_stiffness_found(tmp_path):
+def test_a_servo_deflects_by_its_load_over_the_stiffness_found(tmp_path):
     robot = from_mjcf(HEXAPOD, "plate")
     softness = np.array([1.0, 2.0, 1.5, 0.8, 1.2, 0.5]) * 1e-3
     found = Found({}, compliance={k: (one, 1e-5) for k, one in enumerate(softness)})

@@ -107,8 +107,8 @@ def test_compliance_acts_at_drives_and_at_the_chest():
     for k, drives in enumerate(motion.drive + values[:10] * motion.drive_load):
         frames, turned = humanoid.frames(drives), np.eye(4)
         turned[:3, :3] = Rotation.from_euler("z", chest[k]).as_matrix()
-        hand = frames[3] @ turned @ np.linalg.inv(frames[3]) @ frames[-1]
-        expected = 1e3 * (hand @ [*np.asarray(humanoid.MARKER_MM) / 1e3, 1.0])[:3]
+        tool = frames[3] @ turned @ np.linalg.inv(frames[3]) @ frames[-1]
+        expected = 1e3 * (tool @ [*np.asarray(humanoid.MARKER_MM) / 1e3, 1.0])[:3]
         np.testing.assert_allclose(found[k], expected, rtol=0.0, atol=1e-9)
     assert np.abs(chest).min() > 1e-7
 
@@ -134,11 +134,11 @@ def test_the_chests_axis_is_one_of_those_that_may_be_off():
 
 
 def test_a_full_calibration_finds_a_wrong_robot():
-    """The errors of drives, chest and links are found but for what no pose tells; 60 poses, no noise."""
+    """The errors of drives, chest and links are found, except unidentifiable ones; 60 poses, no noise."""
     full = replace(ROBOT, parameter_set="full", angle_limit_rad=0.3, length_limit_mm=100.0)
     robot = full.seen_at(NEAR, ROBOT.forward(NEAR))
     names = robot.parameters.names
-    # the torso's offsets and the chest's own are told apart
+    # the torso's offsets and the chest's own are separable
     assert {"dtorso1", "dtorso2", "dright3"} <= set(names) and len(names) > 40
     generator = np.random.default_rng(6)
     sizes = {one.name: 1.0 if one.unit == "mm" else 0.005 for one in robot.candidates}
@@ -374,7 +374,7 @@ def _lifted(motion, at, site, turn):
 
 
 def test_links_that_bend_turn_the_hand_about_the_joints():
-    """To first order the hand turns about every joint by the compliance times the moment across its axis."""
+    """To first order the tool turns about every joint by the compliance times the moment across its axis."""
     motion, effect = _motion(ROBOT, NEAR[:5]), library(ROBOT)["link_flexure"]
     assert len(effect.parameters) == len(ROBOT.legs.arm_joints)
     values = np.random.default_rng(6).uniform(1e-11, 3e-11, len(effect.parameters))

@@ -362,7 +362,7 @@ def test_sites_hold_together_too(tmp_path):
     robot = from_mjcf(mjcf(tmp_path, world, equality, servos("crank")), "coupler")
     poses = robot.solve(np.array([[0.3]]), robot.legs.home_mm[None])
     np.testing.assert_allclose(_turned(poses)[0, 1], _four_bar_angle(0.3), atol=1e-12)
-    # the hand is a part of the platform, wherever it floats in the file
+    # the body "hand" is a part of the platform, wherever it is placed in the file
     hand = [point_mass for point_mass in robot.point_masses if point_mass.joint == "platform"][6:]
     np.testing.assert_allclose(np.mean([point_mass.at_mm for point_mass in hand], axis=0), [0.0, 100.0, 0.0], atol=1e-9)
 

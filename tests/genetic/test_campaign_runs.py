@@ -1,4 +1,4 @@
-"""Runs on one calibration set: what they find beside the optimum, the typical one, and the comparison of methods."""
+"""Runs on one calibration set: their results against the optimum, the typical run, and the comparison of methods."""
 
 import numpy as np
 import pandas as pd

@@ -1,4 +1,4 @@
-"""Placements of DH rows after Craig, written out, beside those of the package."""
+"""Placements of DH rows after Craig, written out, independent of those of the package."""
 
 import numpy as np
 from scipy.spatial.transform import Rotation

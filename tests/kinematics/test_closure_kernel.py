@@ -203,8 +203,8 @@ def test_chains_with_a_joint_too_many_close_under_any_twists_and_keep_its_value(
     assert constraints_of(legs, spare_joints(legs)) == [1] * 6
     poses = closure.solve(actuators, start, twists.values)
     assert poses.closed.all()
-    kept = [joint.name.startswith("end z") for joint in legs.passive_joints]
-    assert ((poses.passive == start.passive) == kept).all()
+    unchanged = [joint.name.startswith("end z") for joint in legs.passive_joints]
+    assert ((poses.passive == start.passive) == unchanged).all()
     for way in walks(legs, actuators, poses, twists):
         np.testing.assert_allclose(slow.lack_of(way, poses), 0.0, rtol=0.0, atol=1e-9)
 

@@ -141,7 +141,7 @@ def test_legs_carry_the_platform_along_their_forearms(rich_poses):
     force = loads(_ROBOT, _MASSES, _ROBOT.map_at(theta, points), theta, still, acceleration, payload).member_n
     mass = 3.0 + _PAYLOAD_KG + 1.8
     weight = mass * (np.array([0.0, 0.0, GRAVITY_MM_S2]) - acceleration) / 1000.0
-    # joint 4 lies at the platform's U joint, joint 3 a forearm before it
+    # joint 4 is at the platform's U joint, joint 3 a forearm before it
     passive = _ROBOT.passive_angles(points, theta)
     plane = theta + passive[..., 0]
     cx, cy = _ROBOT.azimuth_cos_sin
@@ -230,15 +230,15 @@ def test_loads_under_another_weight_are_those_of_a_robot_that_leans_and_carries_
         np.array(robot.parts.units) == "mm", 200, 1
     )
     points = robot.forward(drives)
-    told = _at_rest(robot, drives, points)
+    assumed = _at_rest(robot, drives, points)
     slopes = load_slopes(
         robot, _MASSES, robot.map_at(drives, points), drives, np.zeros((6, 3)), np.full(6, _PAYLOAD_KG)
     )
     true = _at_rest(_leaning(robot, lean), drives, points, payload_kg=_PAYLOAD_KG + extra)
     weights = np.array([extra, *lean, *(extra * lean)])
-    for one in fields(told):
-        before, after = getattr(told, one.name), getattr(true, one.name)
-        found = before + sum(w * getattr(slope, one.name) for w, slope in zip(weights, slopes, strict=True))
+    for load in fields(assumed):
+        before, after = getattr(assumed, load.name), getattr(true, load.name)
+        found = before + sum(w * getattr(slope, load.name) for w, slope in zip(weights, slopes, strict=True))
         # the weight's length stays, that of its tangent does not
         scale = max(np.abs(after).max(initial=0.0), 1e-9)
         np.testing.assert_allclose(found, after, rtol=0.0, atol=0.5 * (lean**2).sum() * 2.0 * scale)

@@ -1,4 +1,4 @@
-"""Arms on one trunk, each with a hand of its own: against products of matrices, their slopes and their energy."""
+"""Arms on one trunk, each with its own end effector: against products of matrices, their slopes and their energy."""
 
 from dataclasses import replace
 
@@ -23,24 +23,24 @@ from tests.robots import two_arms
 ROBOT = make_mechanism("two_arms", two_arms.section())
 COUNT = 40
 DRIVES = ROBOT.legs.home_drives + np.random.default_rng(2).uniform(-0.5, 0.5, (COUNT, len(two_arms.DRIVES)))
-HAND = np.array(["right", "left"] * COUNT)[:COUNT]
-SITES = {hand: f"reflector {hand}" for hand in two_arms.HANDS}
+ARM = np.array(["right", "left"] * COUNT)[:COUNT]
+SITES = {arm: f"reflector {arm}" for arm in two_arms.HANDS}
 _STEPS = np.repeat([1e-2, 1e-5], 3)
 
 
 def _own():
-    """Positions (n, 3) of the hands in turn, by products of matrices."""
-    return np.array([two_arms.seen(q, hand) for q, hand in zip(DRIVES, HAND, strict=True)])
+    """Positions (n, 3) of the end effectors in turn, by products of matrices."""
+    return np.array([two_arms.seen(q, arm) for q, arm in zip(DRIVES, ARM, strict=True)])
 
 
 def _readings(position_mm):
-    places = np.array([two_arms.MARKERS[hand] for hand in HAND])
-    return Readings(position_mm, np.array([SITES[hand] for hand in HAND]), places)
+    places = np.array([two_arms.MARKERS[arm] for arm in ARM])
+    return Readings(position_mm, np.array([SITES[arm] for arm in ARM]), places)
 
 
 def _motion(robot=ROBOT, payload_kg=0.0):
-    """The robot at rest at DRIVES, hands in turn."""
-    position, still = robot.guess(DRIVES, HAND), np.zeros((COUNT, 3))
+    """The robot at rest at DRIVES, end effectors in turn."""
+    position, still = robot.guess(DRIVES, ARM), np.zeros((COUNT, 3))
     rest, every = np.zeros_like(DRIVES), np.arange(COUNT)
     course = Course(position, DRIVES, DRIVES, every, every, still, still, np.full(COUNT, payload_kg), (rest, rest))
     return make_motion(robot, Masses(0.0, 0.0, 0.0), course)
@@ -49,11 +49,11 @@ def _motion(robot=ROBOT, payload_kg=0.0):
 def test_each_hand_stands_where_products_of_its_matrices_do():
     assert ROBOT.parts.columns == [f"{name}_rad" for name in two_arms.DRIVES]
     assert [one.site for one in ROBOT.parts.followers] == ["chest"]
-    np.testing.assert_allclose(ROBOT.guess(DRIVES, HAND), _own(), rtol=0.0, atol=1e-9)
+    np.testing.assert_allclose(ROBOT.guess(DRIVES, ARM), _own(), rtol=0.0, atol=1e-9)
     poses = ROBOT.solve(DRIVES, _own())
-    np.testing.assert_array_equal(poses.leg, np.where(HAND == "right", 0, 1))
+    np.testing.assert_array_equal(poses.leg, np.where(ARM == "right", 0, 1))
     np.testing.assert_allclose(poses.position_mm, _own(), rtol=0.0, atol=1e-9)
-    turns = [two_arms.frames(q)[hand][:3, :3] for q, hand in zip(DRIVES, HAND, strict=True)]
+    turns = [two_arms.frames(q)[arm][:3, :3] for q, arm in zip(DRIVES, ARM, strict=True)]
     np.testing.assert_allclose(poses.turn, turns, rtol=0.0, atol=1e-12)
 
 
@@ -95,14 +95,14 @@ def test_the_effect_of_every_site_and_drive_is_the_slope_of_what_is_read():
 
 def test_a_site_of_the_other_arm_changes_nothing():
     at = ROBOT.map(DRIVES, ROBOT.solve(DRIVES, _own()))
-    for hand, other in (("right", "left"), ("left", "right")):
+    for arm, other in (("right", "left"), ("left", "right")):
         for site in (*two_arms.ARMS[other], f"{other} flange", f"{other} frame 7"):
-            assert np.abs(at.effect(site)[hand == HAND]).max() == 0.0
-            assert np.abs(at.effect(site)[other == HAND]).max() > 0.1
+            assert np.abs(at.effect(site)[arm == ARM]).max() == 0.0
+            assert np.abs(at.effect(site)[other == ARM]).max() > 0.1
 
 
 def test_static_loads_are_the_slopes_of_the_potential_energy_of_the_whole_tree():
-    """Of the drives with all that follows them and of the chest alone, whichever hand is read."""
+    """Of the drives with their followers and of the chest alone, whichever end effector is read."""
     motion, h = _motion(), 1e-4
     for k, q in enumerate(DRIVES[:10]):
         steps = h * np.eye(len(q))
@@ -113,19 +113,19 @@ def test_static_loads_are_the_slopes_of_the_potential_energy_of_the_whole_tree()
 
 
 def test_moments_across_joints_are_those_of_all_that_hangs_behind_them():
-    """Of a payload as well, on the arm whose hand is read."""
+    """Of a payload as well, on the arm whose end effector is read."""
     motion, names = _motion(payload_kg=4.0), ROBOT.legs.arm_joints
     assert names == (*two_arms.TRUNK, *two_arms.ARMS["right"], *two_arms.ARMS["left"])
     down = np.array([0.0, 0.0, -GRAVITY_MM_S2 / 1e3])
-    for k, (q, hand) in enumerate(zip(DRIVES[:6], HAND, strict=False)):
+    for k, (q, arm) in enumerate(zip(DRIVES[:6], ARM, strict=False)):
         at = two_arms.frames(q)
         points = [(name, mass, (at[name] @ [*com, 1.0])[:3]) for name, (mass, com) in two_arms.masses()]
-        points.append((hand, 4.0, at[hand][:3, 3]))
+        points.append((arm, 4.0, at[arm][:3, 3]))
         for j, name in enumerate(names):
             arm = next((own for own, rows in two_arms.ARMS.items() if name in rows), None)
             order = [*two_arms.TRUNK, *(two_arms.ARMS[arm] if arm else ()), *((arm,) if arm else ())]
             behind = set(order[order.index(name) :]) | (set() if arm else set(at) - set(two_arms.TRUNK))
-            # a joint's own frame lies on its axis, off along it at most
+            # a joint's own frame is on its axis, shifted along it at most
             z, seat = at[name][:3, 2], at[name][:3, 3] - _slide(name) * at[name][:3, 2]
             moment = sum(np.cross(place - seat, mass * down) for own, mass, place in points if own in behind)
             across = moment - (moment @ z) * z
@@ -144,9 +144,9 @@ def test_compliance_turns_the_joints_of_trunk_and_arms():
     twists = effect.contribute(motion, values).twists
     found = ROBOT.measured(ROBOT.solve(DRIVES, _own(), twists), twists)
     wound = DRIVES + values[:-1] * motion.drive_load
-    for k, hand in enumerate(HAND):
+    for k, arm in enumerate(ARM):
         at = two_arms.frames(wound[k], {"chest": values[-1] * motion.follower_load[k, 0]})
-        np.testing.assert_allclose(found[k], at[hand][:3, 3], rtol=0.0, atol=1e-8)
+        np.testing.assert_allclose(found[k], at[arm][:3, 3], rtol=0.0, atol=1e-8)
     assert np.abs(values * np.c_[motion.drive_load, motion.follower_load]).max() > 1e-3
 
 
@@ -193,7 +193,7 @@ def test_a_urdf_with_several_tips_is_the_same_robot(tmp_path):
     path = file_of(tmp_path, two_arms.urdf_text(), "two_arms.urdf")
     robot = make_mechanism("two_arms", {"urdf": str(path), "tips": {"right": "right", "left": "left"}})
     order = [two_arms.DRIVES.index(column.removesuffix("_rad")) for column in robot.parts.columns]
-    np.testing.assert_allclose(robot.guess(DRIVES[:, order], HAND), _own(), rtol=0.0, atol=1e-7)
+    np.testing.assert_allclose(robot.guess(DRIVES[:, order], ARM), _own(), rtol=0.0, atol=1e-7)
     turned = {"chest", "chest_turned"}
     assert turned == {one.site for one in robot.parts.followers} and turned <= set(robot.legs.arm_joints)
     poses = robot.solve(DRIVES[:, order], _own())
@@ -255,12 +255,12 @@ def test_a_target_that_no_hand_carries_is_refused():
 
 
 def test_orientation_of_each_hand_is_read():
-    """Rotation vectors of hands that are turned at their flanges."""
+    """Rotation vectors of end effectors that are turned at their flanges."""
     numbers, poses = ROBOT.legs.site_numbers, ROBOT.solve(DRIVES, _own())
     twists = ROBOT.twists()
     twists[0, numbers["left flange"], 3:] = [0.01, -0.02, 0.005]
     turn = poses.turn.copy()
-    turn[HAND == "left"] = turn[HAND == "left"] @ Rotation.from_rotvec([0.01, -0.02, 0.005]).as_matrix()
+    turn[ARM == "left"] = turn[ARM == "left"] @ Rotation.from_rotvec([0.01, -0.02, 0.005]).as_matrix()
     readings = Readings(_own(), turn=turn, arm_mm=500.0)
     left = lacking(ROBOT, readings, ROBOT.solve(DRIVES, _own(), twists), twists)
     np.testing.assert_allclose(left, 0.0, atol=1e-6)

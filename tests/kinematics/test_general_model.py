@@ -159,7 +159,7 @@ def test_the_response_at_every_site_is_the_closures_slope(setting):
     assert (off.max(axis=0) <= 1e-6 * size.max(axis=0)).all()
     if setting.robot.name not in {robot.name for robot, _ in ROBOTS.values()}:
         return
-    # every site moves the platform, but for a turn about a ball joint
+    # every site moves the platform, except by a turn about a ball joint
     dead = [site.endswith((" ball", " bar", " end")) for site in _inner_sites(setting.robot)]
     assert (size[:, 0] > 1e-3).all() and ((size[:, 1] > 1e-3) == ~np.array(dead)).all()
 

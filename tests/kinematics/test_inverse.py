@@ -71,7 +71,7 @@ def test_a_stretched_arm_stays_where_it_is_told_to():
 
 
 def test_a_straight_wrist_turns_as_it_is_told():
-    """The hand's turn about the one axis that a straight wrist lacks."""
+    """The end effector's turn about the one axis that a straight wrist lacks."""
     robot = _arm([*_SIX[:4], _SIX[4] | {"home_deg": 0}, _SIX[5]])
     turn = robot.legs.home_turn @ Rotation.from_rotvec([0.3, 0.0, 0.0]).as_matrix()
     found = robot.inverse(robot.legs.home_mm[None], turn=turn[None])
@@ -111,7 +111,7 @@ def test_a_plan_keeps_within_the_ranges_of_the_drives():
 
 
 def test_whole_turns_bring_joints_alone_into_their_ranges():
-    """A slide knows no turns, nor does a drive that another joint follows by half."""
+    """A slide has no whole turns, nor does a drive that another joint follows by half."""
     turn, rows = 2.0 * np.pi, [{"range_deg": [-170, 170]}, {"range_deg": [-90, 90]}, {"drives": {"q2": 0.5}}]
     robot = _arm([*rows, {"sliding": True, "range_mm": [-1.0, 1.0]}])
     values = np.array([0.1, 0.2, 0.3])

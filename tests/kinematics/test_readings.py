@@ -1,4 +1,4 @@
-"""What is read of a robot: reflectors on its tool and orientations, against a plain prediction and its differences."""
+"""Readings of a robot: reflectors on its tool and orientations, against a plain prediction and its differences."""
 
 from dataclasses import replace
 

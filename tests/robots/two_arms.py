@@ -56,18 +56,18 @@ def section(**more):
     trunk = [fixed(BASE), *(row(name, *one) for name, one in TRUNK.items())]
     head = {"xyz_mm": [0.0, 0.0, 0.0], "mass_kg": HEAD_KG, "com_mm": list(HEAD_MM)}
     hands = {
-        hand: [
-            fixed(SHOULDERS[hand]),
+        arm: [
+            fixed(SHOULDERS[arm]),
             *(row(name, *one) for name, one in rows.items()),
-            fixed(HANDS[hand], mass_kg=HAND_KG, com_mm=list(HAND_MM)),
+            fixed(HANDS[arm], mass_kg=HAND_KG, com_mm=list(HAND_MM)),
         ]
-        for hand, rows in ARMS.items()
+        for arm, rows in ARMS.items()
     }
     return {"dh": [*trunk, head], "hands": hands, "convention": "modified", **more}
 
 
 def frames(drives, turned=()):
-    """Placements (4, 4) in mm of all rows' frames by name, and of the hands by theirs, at drive values (11,).
+    """Placements (4, 4) in mm of all rows' frames by name, and of the end effectors by theirs, at drive values (11,).
 
     turned: by joint's name what it turns further, in rad.
     """
@@ -78,23 +78,23 @@ def frames(drives, turned=()):
     result, here = {}, craig.fixed(*BASE)
     for name, (numbers, *_) in TRUNK.items():
         result[name] = here = here @ craig.row(numbers, q[name])
-    for hand, rows in ARMS.items():
-        at = here @ craig.fixed(*SHOULDERS[hand])
+    for arm, rows in ARMS.items():
+        at = here @ craig.fixed(*SHOULDERS[arm])
         for name, (numbers, *_) in rows.items():
             result[name] = at = at @ craig.row(numbers, q[name])
-        result[hand] = at @ craig.fixed(*HANDS[hand])
+        result[arm] = at @ craig.fixed(*HANDS[arm])
     return result
 
 
-def seen(drives, hand, place_mm=(0.0, 0.0, 0.0)):
-    """Position (3,) in mm of a point of a hand's frame."""
-    return (frames(drives)[hand] @ [*place_mm, 1.0])[:3]
+def seen(drives, arm, place_mm=(0.0, 0.0, 0.0)):
+    """Position (3,) in mm of a point of an end effector's frame."""
+    return (frames(drives)[arm] @ [*place_mm, 1.0])[:3]
 
 
 def masses():
-    """Mass in kg and centre in mm of every link by its row, of head and hands."""
+    """Mass in kg and centre in mm of every link by its row, of head and end effectors."""
     links = {name: one[1:] for rows in (TRUNK, *ARMS.values()) for name, one in rows.items()}
-    return [*links.items(), ("chest", (HEAD_KG, HEAD_MM)), *((hand, (HAND_KG, HAND_MM)) for hand in ARMS)]
+    return [*links.items(), ("chest", (HEAD_KG, HEAD_MM)), *((arm, (HAND_KG, HAND_MM)) for arm in ARMS)]
 
 
 def energy(drives, turned=()):
@@ -106,7 +106,7 @@ def energy(drives, turned=()):
 def urdf_text():
     """The tree as a URDF in m; a mimic follows one joint, so that the chest's joint is two at one place."""
     joints, links = "", '<link name="base"/><link name="chest_turned"/>'
-    links += "".join(_link(hand, HAND_KG, HAND_MM) for hand in ARMS) + _link("head", HEAD_KG, HEAD_MM)
+    links += "".join(_link(arm, HAND_KG, HAND_MM) for arm in ARMS) + _link("head", HEAD_KG, HEAD_MM)
     parent, placement = "base", craig.fixed(*BASE)
     for name, (numbers, mass, com) in TRUNK.items():
         placement, more = placement @ craig.row(numbers, 0.0), ""
@@ -117,15 +117,15 @@ def urdf_text():
         joints, links = joints + _joint(name, parent, placement, more), links + _link(name, mass, com)
         parent, placement = name, np.eye(4)
     joints += _joint("head", "chest", np.eye(4), kind="fixed")
-    for hand, rows in ARMS.items():
-        parent, placement = "chest", craig.fixed(*SHOULDERS[hand])
+    for arm, rows in ARMS.items():
+        parent, placement = "chest", craig.fixed(*SHOULDERS[arm])
         for name, (numbers, mass, com) in rows.items():
             joints, links = (
                 joints + _joint(name, parent, placement @ craig.row(numbers, 0.0)),
                 links + _link(name, mass, com),
             )
             parent, placement = name, np.eye(4)
-        joints += _joint(hand, parent, craig.fixed(*HANDS[hand]), kind="fixed")
+        joints += _joint(arm, parent, craig.fixed(*HANDS[arm]), kind="fixed")
     return f'<robot name="two_arms">{links}{joints}</robot>'
 
 

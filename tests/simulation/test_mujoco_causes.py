@@ -26,7 +26,7 @@ def _moment(drives, joint, gravity=(0.0, 0.0, -G)):
 
 
 def _turned(motion, position, joint):
-    """By what angle (n,) about a joint of the arm positions lie off the commanded ones."""
+    """Angle (n,) about a joint of the arm by which positions are off the commanded ones."""
     number = ["axis1", "axis2", "axis3", "axis4", "axis5", "axis6"].index(joint)
     column = mechanism("arm6").map_at(motion.drive, motion.position_mm).drive_response[:, :, number]
     return ((position - motion.position_mm) * column).sum(axis=1) / (column**2).sum(axis=1)
@@ -61,7 +61,7 @@ def test_a_flexible_forearm_bends_as_its_stiffness_says():
     ("name", "drive", "width"), [("arm6", "axis1", 1e-3), ("rrru3", "drive1", 1e-3), ("hexapod", "leg3", 0.1)]
 )
 def test_play_is_lost_where_a_drive_turns_back_and_nowhere_else(name, drive, width):
-    """Once the play is used up the arm trails by half of it, on the other side after the drive has turned back."""
+    """Once the backlash is crossed the arm trails by half of it, on the other side after the drive has turned back."""
     robot, still = simulated(name, play={drive: width}), simulated(name)
     points = near_home(name, *(np.roll(spot, 1) if name == "arm6" else spot for spot in _BACK_AND_FORTH))
     motion, position = standing(robot, points)
@@ -99,8 +99,8 @@ def test_a_hidden_mass_loads_a_soft_servo():
     motion, light = standing(simulated("arm6", **causes), points)
     heavy = standing(simulated("arm6", payload={"tool0": 3.0}, **causes), points)[1]
     hidden = simulated("arm6", **causes)
-    told = hidden.positions(standing(hidden, points, payload_kg=3.0)[0])[0]
-    np.testing.assert_allclose(heavy, told, atol=1e-5)
+    position = hidden.positions(standing(hidden, points, payload_kg=3.0)[0])[0]
+    np.testing.assert_allclose(heavy, position, atol=1e-5)
     # axis 2 is 60 mm from the robot's own axis
     more = 3.0 * G * (points[:, 0] - 60.0) / 2e8
     np.testing.assert_allclose(_turned(motion, heavy, "axis2") - _turned(motion, light, "axis2"), more, rtol=0.01)

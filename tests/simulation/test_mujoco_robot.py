@@ -90,7 +90,7 @@ def test_it_is_measured_as_every_virtual_robot_is():
 
 
 def test_a_campaign_of_the_configuration_is_simulated():
-    """Play of a drive that goes one way only is a constant; nobody claims true deviations beside it."""
+    """Backlash of a drive that goes one way only is a constant; no true deviations are claimed for it."""
     line = {"start_mm": [590, -50, 865], "end_mm": [590, 50, 865], "offsets_y_mm": [0], "points": 4}
     config = {
         "seed": 1,

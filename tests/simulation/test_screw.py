@@ -1,4 +1,4 @@
-"""The bench of a screw: what the encoder reads, and that eq. (19) finds the play in it."""
+"""The bench of a screw: the encoder's readings, and that eq. (19) finds the backlash in them."""
 
 import numpy as np
 import pytest

@@ -107,9 +107,9 @@ def test_same_seed_same_bytes_and_a_lost_point_changes_no_other():
     strict = VirtualRobot(non_repeatability_mm=0.3, rotation_limit_rad=1e-18).run(plan, 0.02, np.random.default_rng(7))[
         0
     ]
-    kept = strict["measured_x_mm"].notna()
-    assert 0 < kept.sum() < len(kept) or kept.sum() == 0
-    assert strict.loc[kept, "measured_x_mm"].equals(runs[0].loc[kept, "measured_x_mm"])
+    solved = strict["measured_x_mm"].notna()
+    assert 0 < solved.sum() < len(solved) or solved.sum() == 0
+    assert strict.loc[solved, "measured_x_mm"].equals(runs[0].loc[solved, "measured_x_mm"])
 
 
 def test_noise_and_wobble_have_the_stated_size():

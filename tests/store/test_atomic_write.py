@@ -27,14 +27,14 @@ WRITERS = {
 
 @pytest.mark.parametrize("name", WRITERS)
 def test_a_full_disk_leaves_what_was_there(name, tmp_path):
-    """What is written first is led to a device that is always full."""
+    """The first write goes to a device that is always full."""
     path = tmp_path / name
     path.write_bytes(b"earlier")
     (tmp_path / f".{name}.partial").symlink_to("/dev/full")
     with pytest.raises(WriteError) as caught:
         WRITERS[name](path)
-    told = str(caught.value)
-    assert told.startswith(f"{path}: cannot be written (") and "No space left" in told and "with room" in told
+    message = str(caught.value)
+    assert message.startswith(f"{path}: cannot be written (") and "No space left" in message and "with room" in message
     assert path.read_bytes() == b"earlier" and list(tmp_path.iterdir()) == [path]
     WRITERS[name](path)
     assert path.read_bytes() != b"earlier" and list(tmp_path.iterdir()) == [path]
@@ -42,7 +42,7 @@ def test_a_full_disk_leaves_what_was_there(name, tmp_path):
 
 @pytest.mark.parametrize("name", WRITERS)
 def test_a_place_that_may_not_be_written_to_is_named(name):
-    """The kernel makes no folder there, for nobody; for root the mode of a folder of ours would mean nothing."""
+    """The kernel makes no folder there for any user; for root the mode of a folder of ours would have no effect."""
     with pytest.raises(
         WriteError, match=rf"^/proc/sys/rrru/{name}: cannot be written \(.*/proc/sys/rrru'\); allowed: "
     ):

@@ -93,7 +93,7 @@ def test_gathered_rows_of_one_key_are_refused(tmp_path):
 @pytest.mark.parametrize("counts", [[3], [3, 0, 4], [5, 5], [10, 1], [0, 0], [2] * 9, [17]])
 @pytest.mark.parametrize("group", [5, 1000])
 def test_gathered_parts_are_the_bytes_of_one_table(tmp_path, monkeypatch, counts, group):
-    """Whatever the parts and the rows of a group: pyarrow writes the whole at once beside it."""
+    """For any parts and rows of a group, compared with pyarrow writing everything at once."""
     monkeypatch.setattr(tables, "_GROUP_ROWS", group)
     paths, rows = _numbered(tmp_path, counts)
     last = tables.typed(TABLES["correlations"], rows.head(1).assign(campaign="last"))

@@ -16,7 +16,7 @@ _MAX_SHARE = 0.2
 
 
 def strays(position_mm, stop, names, on_world):
-    """Which of n readings (n, 3) at stops (n,) are no reading of the reflector of that name, and a text on each.
+    """Which of n readings (n, 3) at stops (n,) are of another reflector than the named one, and a text on each.
 
     names (n,); on_world (n,): which reflectors are fixed to the world. Returns (marked (n,), texts by row's number),
     such as "base3 lies 210 mm away, where base1 is".
@@ -65,7 +65,7 @@ def _apart(grid, body):
 
 
 def _outlying(off):
-    """Which distances (stops,) from what is usual, NaN where not known, are gross; none where many are."""
+    """Which deviations (stops,) from the usual distance, NaN where unknown, are gross; none where many are."""
     if not np.isfinite(off).any():
         return np.zeros(len(off), dtype=bool)
     return unless_many(off > max(_FAR_MM, MAX_ROBUST_SDS * robust_sd(off[np.isfinite(off)])), _MAX_SHARE)

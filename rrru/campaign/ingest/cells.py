@@ -141,7 +141,7 @@ def separator_of(lines, decimal="."):
 
 
 def declared(separator, text):
-    """What to write into the configuration for a text with another separator than a comma."""
+    """Text: what to write into the configuration for a separator other than a comma."""
     decimal = ', decimal: ","' if separator != "," and re.search(r"\d,\d", text) else ""
     return f"format: {{kind: csv, separator: {json.dumps(separator)}{decimal}}}"
 
@@ -173,7 +173,7 @@ def _is_number(text):
 
 
 def _filled(cell):
-    """Whether a cell holds anything."""
+    """Whether a cell is not empty."""
     return cell is not None and cell != ""
 
 

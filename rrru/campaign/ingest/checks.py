@@ -1,4 +1,4 @@
-"""Whether the rows of a measured campaign make sense as runs: numbering, order, time, copies, number of points."""
+"""Checks of a measured campaign's rows as runs: numbering, order, time, copies, number of points."""
 
 import numpy as np
 

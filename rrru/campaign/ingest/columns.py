@@ -174,7 +174,7 @@ def _number(cell, comma):
 
 
 def _fault(cell, comma):
-    """What a cell should hold that does not hold a finite number, else None."""
+    """Text: the expected content of a cell without a finite number, else None."""
     if _blank(cell):
         return "a number; drop a row that lacks one"
     if isinstance(cell, str):
@@ -200,7 +200,7 @@ def _names(ours, cells, rows, theirs, problems):
 
 
 def _blank(cell):
-    """Whether a cell holds nothing."""
+    """Whether a cell is empty."""
     return cell is None or (isinstance(cell, str) and not cell.strip())
 
 

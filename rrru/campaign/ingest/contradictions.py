@@ -205,7 +205,7 @@ def _off(nominal: TargetReadings | None) -> np.ndarray:
 
 
 def _in_words(file: GrossFile, mistakes: Mistakes) -> str:
-    """What to write into the configuration or to mend in the file."""
+    """Text: what to write into the configuration or to correct in the file."""
     texts, spec = [*of_drives(file, mistakes)], file.spec
     if mistakes.shift:
         side, count = ("late", mistakes.shift) if mistakes.shift > 0 else ("early", -mistakes.shift)

@@ -27,7 +27,7 @@ _ENDINGS = {".csv": "csv", ".parquet": "parquet", ".xlsx": "xlsx"}
 
 @dataclass(frozen=True)
 class Format:
-    """How a file is written; raises ConfigError for what does not exist.
+    """Format of a file; raises ConfigError for a setting that does not exist.
 
     kind: one of KINDS, None as the file's ending says; separator: between fields of a text, None: a comma, or of a
     point list what it has; decimal: "." or ","; sheet: of a workbook, None where it has one alone.

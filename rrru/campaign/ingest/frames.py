@@ -1,6 +1,6 @@
-"""Where the instrument and the reflectors stand, from readings of known poses. Lengths in mm, angles in rad.
+"""Places of the instrument and the reflectors from readings of known poses. Lengths in mm, angles in rad.
 
-With poses, centre p_i and orientation R_i of what carries a reflector, one at c on it is read at m_i,
+With poses, centre p_i and orientation R_i of the body that carries a reflector, a reflector at c on it is read at m_i,
 
     Q m_i + s = p_i + R_i c
 

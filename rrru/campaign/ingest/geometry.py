@@ -1,4 +1,4 @@
-"""Whether commanded, drive and measured values of a campaign belong to the robot and to each other. Lengths in mm."""
+"""Consistency of commanded, drive and measured values with the robot and with each other. Lengths in mm."""
 
 from itertools import permutations, product
 
@@ -90,7 +90,7 @@ def check_sizes(sheet, offset_mm=0.0):
 
 
 def _place_stated(sheet):
-    """Whether the place of all that is measured is stated, or moves as the tool does."""
+    """Whether the place of every reflector is stated, or moves as the tool does."""
     if not sheet.mechanism.orients or "target" not in sheet.frame:
         return True
     return set(sheet.frame["target"].astype(str)) <= set(dict(sheet.spec.targets))
@@ -228,7 +228,7 @@ def _elbow_advice(given, command, sheet):
 
 
 def _axes_advice(measured, command, limit):
-    """Which exchange or reversal of the file's axes makes measured positions fit, or None."""
+    """Exchange or reversal of the file's axes that makes measured positions fit, or None."""
     best, text = limit, None
     for order, signs in product(permutations(range(3)), product((1.0, -1.0), repeat=3)):
         off = np.median(np.linalg.norm(measured[:, order] * signs - command, axis=1))

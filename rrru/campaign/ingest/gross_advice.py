@@ -15,7 +15,7 @@ _ALIKE = 2.0
 
 
 def advice(file: GrossFile, found: Hypothesis) -> str:
-    """What to write into the configuration or to mend in the file."""
+    """Text: what to write into the configuration or to correct in the file."""
     mistakes = found.mistakes
     texts = [*of_drives(file, mistakes), *_of_units(file, mistakes)]
     if mistakes.shift:
@@ -43,7 +43,7 @@ def of_drives(file: GrossFile, mistakes: Mistakes) -> Iterator[str]:
 
 
 def _of_units(file: GrossFile, mistakes: Mistakes) -> Iterator[str]:
-    """Keys `unit`, `drive_unit` and `angle_unit`; where commands are in the stated unit, what to mend in the file."""
+    """Keys `unit`, `drive_unit`, `angle_unit`; where commands are in the stated unit, what to correct in the file."""
     spec = file.spec
     unit, drive_unit = spec.unit, mistakes.drive_unit or spec.unit_of_drives
     if mistakes.unit and _commands_are_right(file, mistakes):

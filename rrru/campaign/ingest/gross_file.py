@@ -119,7 +119,7 @@ class GrossFile:
 
     @property
     def count(self) -> int:
-        """How many drives the file has values of."""
+        """Number of drives with values in the file."""
         return self.drive.shape[1]
 
     @property
@@ -205,12 +205,12 @@ class GrossFile:
 
     @property
     def _stated(self) -> np.ndarray:
-        """Which targets' (k,) places are stated."""
+        """Targets (k,) with stated places."""
         return np.isfinite(self.place_mm).all(axis=1)
 
     @cached_property
     def _ways(self) -> int:
-        """How many single mistakes there are."""
+        """Number of single mistakes."""
         return len([*self.given.further(self.units)])
 
     def _spread(self, readings: TargetReadings) -> float:

@@ -1,4 +1,4 @@
-"""What columns and settings of a file may mean: proposals for the user to accept, which ingest itself never makes."""
+"""Proposals of columns and settings for a file, for the user to accept; ingest itself never makes any."""
 
 import re
 from datetime import datetime
@@ -172,7 +172,7 @@ def _reads(text, pattern):
 
 
 def _alike(ours, theirs):
-    """How much a file's name looks like one of ours, 0 to 1."""
+    """Similarity of a file's column name to one of ours, 0 to 1."""
     return max(
         SequenceMatcher(None, _plain(word), _plain(theirs)).ratio() if _axis(word) == _axis(theirs) else 0.0
         for word in _words(ours)

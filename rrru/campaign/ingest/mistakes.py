@@ -18,7 +18,7 @@ _MOST_ORDERED, _MOST_PERMUTED = 4, 6
 
 @dataclass(frozen=True)
 class Mistakes:
-    """What may be wrong with a file of K drives, none where it holds commanded positions alone.
+    """Possible mistakes in a file of K drives, none where it holds commanded positions alone.
 
     signs (K,): by which the drive values are multiplied; order (K,): number of the drive that each column belongs to;
     shift: rows by which the measured columns are late; free: whether the stated places of the targets are wrong;
@@ -42,7 +42,7 @@ class Mistakes:
 
     @property
     def count(self) -> int:
-        """How many mistakes it takes: a sign each, all signs, one order, or one unit for readings and drive values."""
+        """Number of single mistakes: a sign each, all signs, one order, or one unit for readings and drive values."""
         turned = sum(sign < 0 for sign in self.signs)
         turned = 1 if turned == len(self.signs) and turned else turned
         lengths = len({self.unit, self.drive_unit} - {None})
@@ -51,7 +51,7 @@ class Mistakes:
 
     @property
     def of_readings(self) -> bool:
-        """Whether what was measured is wrong and nothing of the drive values."""
+        """Whether the readings are wrong and none of the drive values."""
         return self == replace(Mistakes.none(len(self.signs)), **self._of_readings)
 
     @property

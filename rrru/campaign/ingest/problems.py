@@ -1,4 +1,4 @@
-"""What is wrong with a measurement file, collected until everything has been looked at."""
+"""Errors of a measurement file, collected until every check is done."""
 
 from collections import defaultdict
 

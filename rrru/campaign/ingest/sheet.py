@@ -60,7 +60,7 @@ class Sheet:
 
     @property
     def drive_name(self):
-        """What the columns of actuator values hold."""
+        """Quantity in the columns of actuator values."""
         return drive_name(self.mechanism)
 
     def note(self, kind, ours, value, allowed, row=None):
@@ -76,7 +76,7 @@ class Sheet:
 
 
 def drive_name(mechanism):
-    """What a robot's columns of actuator values hold."""
+    """Quantity in a robot's columns of actuator values."""
     return _DRIVE_NAMES.get(frozenset(mechanism.parts.units), "actuator values")
 
 

@@ -1,4 +1,4 @@
-"""How to read a measurement file: what the configuration says of it."""
+"""Settings of the configuration for reading a measurement file."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
@@ -26,7 +26,7 @@ _CHOICES = {
 
 @dataclass(frozen=True)
 class IngestSpec:
-    """How to read a measurement file; raises ConfigError for a setting that does not exist.
+    """Settings for reading a measurement file; raises ConfigError for a setting that does not exist.
 
     columns: our name -> the file's column name, absent = the same name. unit: of the file's positions ("mm", "m",
     "inch"; speeds are mm/s, payloads kg). drive_unit: of drive values that are lengths, None as `unit`. angle_unit:

@@ -75,5 +75,5 @@ def _rows(sheet):
 
 
 def _filled(cell):
-    """Whether a cell holds anything."""
+    """Whether a cell is not empty."""
     return cell is not None and str(cell).strip() != ""

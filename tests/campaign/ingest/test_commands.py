@@ -69,7 +69,7 @@ def test_another_number_of_rows_without_names_is_refused(tmp_path):
     assert "52 measured rows and 50 commands" in problems[0]["value"] and "`name`" in problems[0]["allowed"]
 
 
-def test_a_name_that_nobody_commanded_is_refused_with_its_row(tmp_path):
+def test_a_name_without_a_command_is_refused_with_its_row(tmp_path):
     problems = problems_of(tmp_path, NAMED[["name", "trajectory", *MEASURED]], NAMED[["name", *COMMAND]].drop(index=7))
     assert [(p["row"], p["value"]) for p in problems] == [(9, "'P7'")]
 

@@ -31,9 +31,9 @@ def _tripod_file(name):
     robot, height = _TRIPODS[name]
     generator = np.random.default_rng(4)
     sent = generator.uniform(-40.0, 40.0, (40, 3)) + np.array([0.0, 0.0, height])
-    told = dict(zip(robot.parts.columns, robot.inverse(sent).T, strict=True))
+    drives = dict(zip(robot.parts.columns, robot.inverse(sent).T, strict=True))
     seen = sent + 0.1 * generator.standard_normal(sent.shape)
-    columns = told | rows.vector_columns("command", sent) | rows.vector_columns("measured", seen)
+    columns = drives | rows.vector_columns("command", sent) | rows.vector_columns("measured", seen)
     return robot, pd.DataFrame(columns).assign(trajectory="points")
 
 

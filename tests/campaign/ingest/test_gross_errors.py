@@ -26,7 +26,7 @@ _SPEC = IngestSpec("file.csv", frame="register", targets={"ball": _PLACE_MM})
 
 
 def _made(seed, kind=_arm):
-    """A robot with ordinary errors of all its numbers, and its file: a reflector in a frame that nobody knows."""
+    """A robot with ordinary errors of all its parameters, and its file: a reflector in an unknown frame."""
     generator = np.random.default_rng(seed)
     robot, driven, position = kind(generator)
     sizes = np.array([_ERROR_SD[unit] for unit in robot.parameters.units])
@@ -34,8 +34,8 @@ def _made(seed, kind=_arm):
     assert poses.closed.all()
     seen = Rotation.random(random_state=generator).apply(poses.point(np.array(_PLACE_MM)))
     seen = seen + generator.uniform(-2000.0, 2000.0, 3) + _NOISE_MM * generator.standard_normal(seen.shape)
-    told = dict(zip(robot.parts.columns, driven.T, strict=True)) | rows.vector_columns("measured", seen)
-    return robot, pd.DataFrame(told).assign(trajectory="poses", target="ball")
+    columns = dict(zip(robot.parts.columns, driven.T, strict=True)) | rows.vector_columns("measured", seen)
+    return robot, pd.DataFrame(columns).assign(trajectory="poses", target="ball")
 
 
 def _shifted(frame, by):
@@ -91,17 +91,17 @@ def _scara(generator):
 
 @pytest.mark.parametrize("kind", [_arm, _scara])
 def test_one_wrong_place_of_three_is_named_and_the_others_stay(kind):
-    """Of a robot that turns about z only, too, whose readings do not tell the heights of all together."""
+    """Also for a robot that turns about z only, whose readings do not determine a common height of all targets."""
     generator = np.random.default_rng(11)
     places = {"a": (60.0, 0.0, 40.0), "b": (-50.0, 60.0, 40.0), "c": (-40.0, -70.0, 60.0)}
     robot, driven, position = kind(generator)
     poses, turn = robot.solve(driven, position), Rotation.random(random_state=generator)
-    told = dict(zip(robot.parts.columns, driven.T, strict=True))
+    columns = dict(zip(robot.parts.columns, driven.T, strict=True))
     frames = []
     for name, place in places.items():
         seen = turn.apply(poses.point(np.array(place))) + np.array([900.0, -300.0, 200.0])
         seen = seen + _NOISE_MM * generator.standard_normal(seen.shape)
-        frames.append(pd.DataFrame(told | rows.vector_columns("measured", seen)).assign(target=name))
+        frames.append(pd.DataFrame(columns | rows.vector_columns("measured", seen)).assign(target=name))
     frame = pd.concat(frames, ignore_index=True).assign(trajectory="poses")
     assert find_gross_error(frame, replace(_SPEC, targets=places), robot) is None
     wrong = places | {"b": (-10.0, 60.0, 40.0)}
@@ -139,8 +139,8 @@ def _commanded(seed):
     driven = frame[[*robot.parts.columns]].to_numpy()
     poses = robot.solve(driven, robot.guess(driven))
     sent = poses.point(np.asarray(robot.tool_mm))
-    told = rows.vector_columns("command", sent) | rows.turn_columns("command", poses.turn)
-    return robot, frame.drop(columns=[*robot.parts.columns]).assign(**told)
+    columns = rows.vector_columns("command", sent) | rows.turn_columns("command", poses.turn)
+    return robot, frame.drop(columns=[*robot.parts.columns]).assign(**columns)
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -202,14 +202,14 @@ def test_the_file_of_another_robot_does_not_fit(tmp_path):
 
 
 def _two_arms(seed):
-    """The robot of two arms, and its file of both hands' markers whose places are stated."""
+    """The robot of two arms, and its file of both end effectors' markers with stated places."""
     generator = np.random.default_rng(seed)
     robot = make_mechanism("two_arms", two_arms.section())
     driven = robot.legs.home_drives + generator.uniform(-0.5, 0.5, (40, len(two_arms.DRIVES)))
-    every, hands = np.repeat(driven, 2, axis=0), np.tile(["right", "left"], len(driven))
-    seen = np.array([two_arms.seen(q, hand, two_arms.MARKERS[hand]) for q, hand in zip(every, hands, strict=True)])
+    every, arms = np.repeat(driven, 2, axis=0), np.tile(["right", "left"], len(driven))
+    seen = np.array([two_arms.seen(q, arm, two_arms.MARKERS[arm]) for q, arm in zip(every, arms, strict=True)])
     seen = Rotation.random(random_state=generator).apply(seen) + generator.normal(size=seen.shape)
-    frame = pd.DataFrame(every, columns=robot.parts.columns).assign(trajectory="poses", target=hands)
+    frame = pd.DataFrame(every, columns=robot.parts.columns).assign(trajectory="poses", target=arms)
     spec = IngestSpec("file.csv", frame="register", targets=two_arms.MARKERS)
     return robot, frame.assign(**rows.vector_columns("measured", seen)), spec
 
@@ -276,7 +276,7 @@ def test_what_to_write_replaces_what_the_configuration_states(tmp_path):
     with pytest.raises(IngestError) as refused:
         ingest(replace(spec, signs={drives[1]: -1}), robot)
     assert f"allowed: signs: {{{drives[1]}: -1, {drives[4]}: -1}}, which leaves" in str(refused.value)
-    # what is advised for exchanged columns of which one is counted in the opposite direction, too
+    # the advice for exchanged columns of which one is also counted in the opposite direction
     order, turned = Mistakes((1, 1, 1), (1, 0, 2)), Mistakes((-1, 1, 1), (0, 1, 2))
     drive = np.arange(6.0).reshape(2, 3)
     for first, second in ((order, turned), (turned, order)):
@@ -297,7 +297,7 @@ def test_signs_and_order_are_of_the_robots_drives(wrong, text):
 
 
 def test_drive_values_that_contradict_the_commands_are_named(tmp_path):
-    """Measured positions lie about the commanded ones: drive values alone show what is wrong with them."""
+    """Measured positions are near the commanded ones: drive values alone show what is wrong with them."""
     robot, frame = _made(5)
     drives = [*robot.parts.columns]
     sent = robot.forward(frame[drives].to_numpy())

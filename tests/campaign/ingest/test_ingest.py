@@ -58,7 +58,7 @@ def test_a_campaign_is_taken_as_it_stands(name, rows, runs):
 
 
 def test_drive_angles_alone_do_over_a_whole_campaign(tmp_path):
-    """Angles with six decimals tell the commanded positions to a micrometre, far from home as well."""
+    """Angles with six decimals determine the commanded positions to a micrometre, far from home as well."""
     table = pd.read_csv(DATA / "field_09.csv")
     path = written(table.drop(columns=COMMAND), tmp_path / "angles.csv")
     found = ingest(IngestSpec(str(path)), ROBOT)
@@ -70,8 +70,8 @@ def test_parquet_gives_the_same_table_as_csv(field, expected, tmp_path):
 
 
 def test_parquet_with_an_index_of_pandas_and_categories_is_taken(field, expected, tmp_path):
-    kept = field[field["point"] != 4].astype({"trajectory": "category"})
-    kept.to_parquet(tmp_path / "f.parquet")
+    remaining = field[field["point"] != 4].astype({"trajectory": "category"})
+    remaining.to_parquet(tmp_path / "f.parquet")
     same(
         ingest(IngestSpec(str(tmp_path / "f.parquet")), ROBOT).measurements,
         expected[expected["point"] != 4].reset_index(drop=True),
@@ -144,7 +144,7 @@ def test_a_blank_optional_column_counts_as_missing(field, tmp_path):
     assert [note[:21] for note in result.notes] == ["column time_s is blan", "no drive angles: thet"]
 
 
-def test_columns_nobody_declared_can_be_left_out(field, expected, tmp_path):
+def test_undeclared_columns_can_be_left_out(field, expected, tmp_path):
     result = ingest(IngestSpec(written(field.assign(humidity=40.0), tmp_path / "f.csv"), extra_columns="ignore"), ROBOT)
     same(result.measurements, expected)
     assert result.notes == ("undeclared columns left out: humidity",)
@@ -168,9 +168,9 @@ def test_text_files_of_other_systems_are_taken(expected, tmp_path):
 
 
 def test_missing_points_do_not_matter(field, tmp_path):
-    kept = field.drop(index=[0, 4, 5, 60, 221])
-    result = ingest(IngestSpec(written(kept, tmp_path / "f.csv")), ROBOT)
-    assert np.array_equal(result.measurements["point"], kept["point"])
+    remaining = field.drop(index=[0, 4, 5, 60, 221])
+    result = ingest(IngestSpec(written(remaining, tmp_path / "f.csv")), ROBOT)
+    assert np.array_equal(result.measurements["point"], remaining["point"])
     assert (result.measurements["status"] == "ok").all()
 
 
@@ -193,7 +193,7 @@ def test_stale_readings_are_left_out_and_named(field, expected, tmp_path):
     assert text in result.notes
 
 
-def test_a_run_that_nobody_numbered_may_be_short(field, tmp_path):
+def test_a_run_without_a_number_in_the_file_may_be_short(field, tmp_path):
     """As where a path turns back after its first two points."""
     rows = field.iloc[[0, 1, *range(26, 222)]].drop(columns=["run", "point"])
     table = ingest(IngestSpec(written(rows, tmp_path / "file.csv")), ROBOT).measurements

@@ -1,4 +1,4 @@
-"""Files of a robot with two hands, both read at every pose in an instrument's frame."""
+"""Files of a robot with two end effectors, both read at every pose in an instrument's frame."""
 
 import numpy as np
 import pandas as pd
@@ -18,10 +18,10 @@ _CAMERA = Rotation.from_euler("xyz", (0.02, -0.01, 1.6)).as_matrix()
 def _file(count=40):
     """Rows of drive values and positions of both markers in m, the camera's."""
     drives = ROBOT.legs.home_drives + np.random.default_rng(2).uniform(-0.5, 0.5, (count, len(two_arms.DRIVES)))
-    every, hands = np.repeat(drives, 2, axis=0), np.tile(["right", "left"], count)
-    seen = np.array([two_arms.seen(q, hand, two_arms.MARKERS[hand]) for q, hand in zip(every, hands, strict=True)])
+    every, arms = np.repeat(drives, 2, axis=0), np.tile(["right", "left"], count)
+    seen = np.array([two_arms.seen(q, arm, two_arms.MARKERS[arm]) for q, arm in zip(every, arms, strict=True)])
     seen = (seen @ _CAMERA.T + [2000.0, -1000.0, 50.0] + np.random.default_rng(3).normal(size=seen.shape)) / 1e3
-    frame = pd.DataFrame(every, columns=ROBOT.parts.columns).assign(trajectory="poses", target=hands)
+    frame = pd.DataFrame(every, columns=ROBOT.parts.columns).assign(trajectory="poses", target=arms)
     return frame.assign(**rows.vector_columns("measured", seen))
 
 
@@ -35,11 +35,11 @@ def test_the_markers_of_both_hands_and_the_frame_are_found(tmp_path):
     found = _ingested(frame, tmp_path)
     assert (found.measurements["status"] == "ok").all() and len(found.measurements) == len(frame)
     np.testing.assert_allclose(found.registration.rotation, _CAMERA.T, atol=2e-3)
-    for hand, place in two_arms.MARKERS.items():
-        own = found.measurements[found.measurements["target"] == hand]
-        np.testing.assert_allclose(rows.vectors(own, "target"), np.tile(place, (len(own), 1)), atol=2.0)
-        expected = [two_arms.seen(q, hand) for q in own[ROBOT.parts.columns].to_numpy()]
-        np.testing.assert_allclose(rows.command(own), expected, atol=1e-6)
+    for arm, place in two_arms.MARKERS.items():
+        its = found.measurements[found.measurements["target"] == arm]
+        np.testing.assert_allclose(rows.vectors(its, "target"), np.tile(place, (len(its), 1)), atol=2.0)
+        expected = [two_arms.seen(q, arm) for q in its[ROBOT.parts.columns].to_numpy()]
+        np.testing.assert_allclose(rows.command(its), expected, atol=1e-6)
 
 
 def test_rows_have_to_say_which_hand_they_are_of(tmp_path):

@@ -36,7 +36,7 @@ def _ingested(frame, folder, **options):
 
 
 def test_drive_values_are_taken_as_they_are_where_positions_do_not_tell_them(tmp_path):
-    """The tool turns along the path, which the inverse at the home orientation knows nothing of."""
+    """The tool turns along the path, which the inverse at the home orientation does not represent."""
     frame = _file()
     assert np.abs(ARM.inverse(rows.command(frame)) - frame[ARM.parts.columns].to_numpy()).max() > 0.1
     found = _ingested(frame, tmp_path).measurements
@@ -57,12 +57,12 @@ def test_commanded_poses_are_in_reach_as_they_are_turned(tmp_path):
         trajectory="poses"
     )
     measured = command[met] + draw.normal(0.0, 0.02, command[met].shape)
-    told = rows.vector_columns("command", command[met]) | rows.vector_columns("measured", measured)
-    found = _ingested(frame.assign(**told), tmp_path).measurements
+    columns = rows.vector_columns("command", command[met]) | rows.vector_columns("measured", measured)
+    found = _ingested(frame.assign(**columns), tmp_path).measurements
     off = ARM.forward(rows.actuators(found, ARM)) - command[met]
     assert len(found) == met.sum() and np.abs(off).max() < 1e-6
     with pytest.raises(IngestError, match="out of reach, with the platform turned as in the home pose"):
-        _ingested(frame.assign(**told).drop(columns=[*TURNS["command"]]), tmp_path)
+        _ingested(frame.assign(**columns).drop(columns=[*TURNS["command"]]), tmp_path)
 
 
 def test_points_outside_of_a_drive_s_range_are_told_and_used(tmp_path):
@@ -73,8 +73,8 @@ def test_points_outside_of_a_drive_s_range_are_told_and_used(tmp_path):
     frame.to_csv(tmp_path / "arm.csv", index=False)
     found = ingest(IngestSpec(str(tmp_path / "arm.csv")), replace(ARM, drive_range=ranges))
     count = sum(0.6 * k / 39 > 0.4 for k in range(40))
-    told = f"{count} of 40 points are outside of the range of axis6_rad, -0.1 to 0.4 rad, and are used"
-    assert [note for note in found.notes if "range" in note] == [told]
+    expected = f"{count} of 40 points are outside of the range of axis6_rad, -0.1 to 0.4 rad, and are used"
+    assert [note for note in found.notes if "range" in note] == [expected]
     assert (found.measurements["status"] == "ok").all()
     assert not any("range" in note for note in _ingested(frame, tmp_path).notes)
 
@@ -92,7 +92,7 @@ def test_degrees_of_an_arm_are_converted_when_declared_and_refused_when_not(tmp_
 @pytest.mark.parametrize(("factor", "stated", "right"), [(180.0 / np.pi, "rad", "deg"), (1.0, "deg", "rad")])
 @pytest.mark.parametrize("length", [1.0, 1e-3])
 def test_angles_alone_in_another_unit_than_stated_are_one_problem(factor, stated, right, length, tmp_path):
-    """Whatever the unit of the measured positions is; what was computed from the angles is not held against them."""
+    """In any unit of the measured positions; commanded positions computed from the angles do not contradict them."""
     frame = _file().drop(columns=[f"command_{axis}_mm" for axis in "xyz"])
     frame[ARM.parts.columns] *= factor
     frame[MEASURED] *= length
@@ -111,7 +111,7 @@ def test_a_column_of_another_robot_is_refused_with_the_names_of_this_one(tmp_pat
 
 
 def test_a_target_s_own_offset_is_no_second_problem(tmp_path):
-    """A reflector 120 mm beside the tool, and a point that stands twice: one problem, not `frame: register` besides."""
+    """A reflector 120 mm from the tool, and a repeated point: one problem, without `frame: register` in addition."""
     frame = _file()
     drives = frame[[*ARM.parts.columns]].to_numpy()
     seen = ARM.solve(drives, rows.command(frame)).point(np.array([120.0, 0.0, 0.0]))

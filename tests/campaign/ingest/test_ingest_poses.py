@@ -61,9 +61,9 @@ def _file(arm, driven, truth=None, registered=True, noise=1.0, twists=0.0):
     shaken = Rotation.from_rotvec(noise * _NOISE_RAD * generator.normal(size=(count, 3)))
     read = (shaken * frame * Rotation.from_matrix(poses.turn) * turn).as_quat()
     joints = dict(zip(arm.parts.columns, driven.T, strict=True))
-    told = dict(zip([*_POINTS, *_QUATERNION], [*point.T, *read.T], strict=True))
+    readings = dict(zip([*_POINTS, *_QUATERNION], [*point.T, *read.T], strict=True))
     target = {} if registered else {"target": "a"}
-    return pd.DataFrame({"trajectory": "poses", **target, **joints, **told})
+    return pd.DataFrame({"trajectory": "poses", **target, **joints, **readings})
 
 
 def _taken(folder, table, robot, **options):
@@ -94,7 +94,7 @@ def test_poses_of_joints_alone_are_brought_into_the_robots_frame(arm, driven, tm
 
 
 def test_deviations_are_found_beside_frame_tool_and_noise(arm, driven, tmp_path):
-    """A fit of everything that poses tell: noise estimated, and the robot's own numbers by their errors."""
+    """A fit of all identifiable parameters: noise estimated, and the robot's own parameters by their errors."""
     truth = _truth(arm)
     found = _taken(tmp_path, _file(arm, driven, truth), arm, frame="register")
     robot = _as_read(arm, found)
@@ -105,7 +105,7 @@ def test_deviations_are_found_beside_frame_tool_and_noise(arm, driven, tmp_path)
     fit = calibrate(residuals, _NOISE_MM)
     assert fit.rms_mm == pytest.approx(np.sqrt(3.0) * _NOISE_MM, rel=0.15)
     assert fit.turn_rms_rad == pytest.approx(np.sqrt(3.0) * _NOISE_RAD, rel=0.15)
-    # what no gauge changes: distances between the reflector's places in fresh poses
+    # independent of the choice of parameters: distances between the reflector's places in fresh poses
     fresh = arm.legs.home_drives + 0.5 * np.random.default_rng(8).uniform(-1.0, 1.0, (40, 6))
     guess, place = np.tile(arm.legs.home_mm, (40, 1)), rows.vectors(found.measurements, "target")[:40]
     true = arm.solve(fresh, guess, arm.twists_of(truth)).point(_SPOTS["a"])
@@ -145,7 +145,7 @@ def _motion(arm, driven):
 
 @pytest.mark.parametrize("registered", [True, False])
 @pytest.mark.parametrize("known", [(), ("a", "b")])
-def test_reflectors_are_found_where_nobody_states_them(arm, driven, tmp_path, registered, known):
+def test_reflectors_without_stated_places_are_found(arm, driven, tmp_path, registered, known):
     poses = arm.solve(driven, np.tile(arm.legs.home_mm, (len(driven), 1)))
     frame, shift = (_FRAME, _SHIFT) if registered else (Rotation.identity(), 0.0)
     seen = np.stack([frame.apply(poses.point(place)) + shift for place in _SPOTS.values()], axis=1).reshape(-1, 3)
@@ -276,7 +276,7 @@ def test_candidates_of_reflectors_are_shifts_of_the_platforms_frame(arm):
 
 
 def _seen_by_a_tracker(robot, driven, places, errors, generator):
-    """A file of reflectors at places by name, read in a frame that nobody knows; errors: of the robot, by name."""
+    """A file of reflectors at places by name, read in an unknown frame; errors: of the robot, by name."""
     guess = robot.guess(driven)
     poses = robot.solve(driven, guess, robot.twists_of(errors))
     assert poses.closed.all()
@@ -324,8 +324,8 @@ def test_the_place_on_a_platform_that_never_turns_is_an_assumption(tmp_path):
     places = {"one": (40.0, 10.0, -35.0), "two": (-60.0, 25.0, -80.0)}
     table = _seen_by_a_tracker(robot, driven, places, {}, generator)
     notes = _taken(tmp_path, table, robot, frame="register").notes
-    told = [one for one in notes if one.startswith("reflector ")]
-    assert len(told) == 2 and all("assumed at" in one and "does not determine it" in one for one in told)
+    assumed = [note for note in notes if note.startswith("reflector ")]
+    assert len(assumed) == 2 and all("assumed at" in note and "does not determine it" in note for note in assumed)
 
 
 def _scara_of(first_mm, second_mm):

@@ -59,7 +59,7 @@ def _hexapod(generator):
 
 
 def _file(folder, made, generator, zeros):
-    """A file of a robot of zeros (K,): three reflectors nobody knows, in a frame nobody knows."""
+    """A file of a robot with zero offsets (K,): three reflectors at unknown places, in an unknown frame."""
     robot, driven, position = made
     poses = robot.solve(driven + zeros, position)
     assert poses.closed.all()
@@ -68,9 +68,9 @@ def _file(folder, made, generator, zeros):
     for name in ("a", "b", "c"):
         seen = frame.apply(poses.point(generator.uniform(-100.0, 100.0, 3))) + shift
         seen += _NOISE_MM * generator.standard_normal(seen.shape)
-        told = dict(zip(robot.parts.columns, driven.T, strict=True))
-        told |= rows.vector_columns("command", position) | rows.vector_columns("measured", seen)
-        parts.append(pd.DataFrame({"trajectory": "poses", "target": name, "stop": np.arange(len(seen)), **told}))
+        columns = dict(zip(robot.parts.columns, driven.T, strict=True))
+        columns |= rows.vector_columns("command", position) | rows.vector_columns("measured", seen)
+        parts.append(pd.DataFrame({"trajectory": "poses", "target": name, "stop": np.arange(len(seen)), **columns}))
     table = pd.concat(parts).sort_values(["stop", "target"]).drop(columns="stop")
     table.to_csv(folder / "mine.csv", index=False)
     return ingest(IngestSpec(str(folder / "mine.csv"), frame="register"), robot)
@@ -98,7 +98,7 @@ def test_lost_zeros_of_arms_are_found_with_frame_and_reflectors(seed, tmp_path):
     assert (found.measurements["status"] == "ok").all()
     fit, robot = _calibrated(found, made[0])
     assert fit.rms_mm < 1.2 * np.sqrt(3.0) * _NOISE_MM and not fit.at_bound.any()
-    # the frame imitates the first drive's zero, reflectors the last one's
+    # the first drive's zero offset is confounded with the frame, the last one's with the reflectors
     values = dict(zip(fit.parameters.names, fit.deviations.tolist(), strict=True))
     for k in (2, 3, 4, 5):
         assert values[f"dq{k}"] == pytest.approx(zeros[k - 1], abs=2e-3)
@@ -118,7 +118,7 @@ def test_lost_lengths_of_hexapods_are_found_with_frame_and_reflectors(seed, tmp_
     assert fit.rms_mm < 1.2 * np.sqrt(3.0) * _NOISE_MM and not fit.at_bound.any()
     noted = list(zero_notes(fit.estimate, robot))
     assert any(note.startswith("leg ") and " mm (95 %: " in note for note in noted)
-    # what is not sure is not told
+    # an uncertain zero offset gets no note
     unsure, sure = (replace(fit.estimate, covariance=np.diag((share * fit.deviations) ** 2)) for share in (0.3, 0.2))
     assert not list(zero_notes(unsure, robot))
     assert [note.partition(":")[0] for note in zero_notes(sure, robot)] == [note.partition(":")[0] for note in noted]

@@ -1,4 +1,4 @@
-"""An inclinometer on the platform: its prediction in plain words, its slopes, and the tilt of the base it tells."""
+"""An inclinometer on the platform: prediction written out, slopes, and the tilt of the base that it determines."""
 
 import numpy as np
 import pytest

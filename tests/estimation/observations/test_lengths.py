@@ -106,7 +106,7 @@ def test_a_row_without_readings_stays_finite_and_is_not_counted():
 def test_closed_form_start_is_the_machine_where_nothing_is_missing(count, dimensions):
     lengths, anchors, places = machine(4, count, dimensions, noise_mm=0.0)
     found = align_to_frame(solve_anchors(lengths.counted**2 - lengths.heights_mm**2, dimensions))
-    # lengths do not tell a space from its mirror image
+    # lengths do not distinguish a space from its mirror image
     sign = np.array([1.0, 1.0, np.sign(anchors[3, 2] * found[3, 2]) if dimensions == 3 else 1.0])[:dimensions]
     np.testing.assert_allclose(found * sign, anchors, atol=1e-4)
     np.testing.assert_allclose(lengths.places(values_of(lengths, anchors)), places, atol=1e-6)
