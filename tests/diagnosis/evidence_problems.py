@@ -15,18 +15,18 @@ from tests.diagnosis import arms, campaigns
 # prior scales over what is left of an effect, and levels of the discrepancy
 _WEAK, _STRONG, _NO_LEVEL, _HIGH_LEVEL = 1.0, 30.0, 0, 3
 _SOFT = EffectTerm("drive_compliance"), EffectTerm("link_flexure")
-_PLAY = EffectTerm("backlash"), EffectTerm("joint_clearance")
+_CLEARANCE = EffectTerm("backlash"), EffectTerm("joint_clearance")
 _TRIPOD = (
     (EffectTerm("backlash"),),
     (EffectTerm("drive_compliance", legs=SAME),),
     (EffectTerm("joint_clearance", 3), EffectTerm("backlash")),
     _SOFT,
-    (*_PLAY, EffectTerm("servo_lag")),
+    (*_CLEARANCE, EffectTerm("servo_lag")),
     (*_SOFT, EffectTerm("thermal_growth", 2)),
-    (*_SOFT, *_PLAY),
-    (*_SOFT, *_PLAY, EffectTerm("servo_lag")),
-    (*_SOFT, *_PLAY, EffectTerm("servo_lag"), EffectTerm("thermal_growth", 4)),
-    (*_SOFT, *_PLAY, EffectTerm("axis_tilt"), EffectTerm("encoder_eccentricity")),
+    (*_SOFT, *_CLEARANCE),
+    (*_SOFT, *_CLEARANCE, EffectTerm("servo_lag")),
+    (*_SOFT, *_CLEARANCE, EffectTerm("servo_lag"), EffectTerm("thermal_growth", 4)),
+    (*_SOFT, *_CLEARANCE, EffectTerm("axis_tilt"), EffectTerm("encoder_eccentricity")),
 )
 _ARM = (
     (EffectTerm("backlash"),),

@@ -61,7 +61,7 @@ def test_a_drive_that_turns_back_at_a_reading_leaves_its_sense_open_and_one_betw
         assert np.flatnonzero(found[:, 1]).tolist() == unknown and not found[:, [0, 2]].any()
 
 
-def test_where_two_interpolations_are_apart_none_tells_where_a_drive_turns_back():
+def test_where_two_interpolations_are_apart_none_determines_where_a_drive_reverses():
     """One crest is half a step from a reading, by another path a quarter: both readings next to it are open."""
     path, index = _swing(4.0)
     other, between = path.copy(), slice(25, 32)
@@ -88,7 +88,7 @@ def _driven(effects, widths):
     return case, share
 
 
-def test_known_senses_are_those_that_were_driven_and_open_ones_are_found_from_strong_play():
+def test_known_senses_are_those_that_were_driven_and_open_ones_are_found_from_strong_backlash():
     widths = np.array([2e-3, 2e-3, 2e-3])
     case, share = _driven((active("backlash", widths),), widths)
     state = State(ERRORS, {("backlash", 0): widths})
@@ -204,7 +204,7 @@ def test_jitter_of_joint_values_changes_neither_verdict_nor_errors(along_lines):
     assert np.sqrt((off**2).mean()) < 1.5
 
 
-def test_where_hardly_a_sense_is_known_only_play_is_not_tested():
+def test_where_hardly_a_sense_is_known_only_backlash_is_not_tested():
     """At 5 of 250 stops: all readings find the compliance, and a sentence says why backlash was not tested."""
     stiff = np.array([0.0, 6e-9, 1.2e-8, 0.0, 2e-8, 0.0])
     frame = arms.measure((arms.active("drive_compliance", stiff),), 250)

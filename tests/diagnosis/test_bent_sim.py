@@ -11,7 +11,7 @@ from rrru.studies.blind_validation.faults import Fault
 from rrru.studies.blind_validation.foreign import FileRobot
 from tests.studies.blind_validation.files import conditions
 
-_PLAY = FileRobot(
+_WITH_BACKLASH = FileRobot(
     "own_rrru3_file_0000",
     "rrru3_file",
     "own",
@@ -70,9 +70,9 @@ def _diagnosed(robot, seed):
     return known, diagnose(points, measured, GapSettings(), details=False)
 
 
-def test_what_the_linear_sim_lacks_is_not_unexplained():
+def test_what_the_linear_model_lacks_is_not_unexplained():
     """A robot on which it was, 0.026 mm, though the effect is the plant's own and the exact model fits to the noise."""
-    known, found = _diagnosed(_PLAY, 260711)
+    known, found = _diagnosed(_WITH_BACKLASH, 260711)
     assert found.verdict["effects"] == "backlash"
     left = found.inference.case.residual(found.state)
     assert np.sqrt((left**2).mean()) == pytest.approx(known.noise_mm, rel=0.1)

@@ -78,7 +78,7 @@ def test_what_does_not_repeat_is_scatter():
     assert budget.loc["drive_compliance", "rms_mm"] == pytest.approx(true, rel=0.15)
 
 
-def test_nobody_knows_the_scatter_where_no_noise_is_stated():
+def test_the_scatter_is_unknown_where_no_noise_is_stated():
     budget, _ = _budget(measure(), None)
     assert budget.loc["scatter", "share"] == 0.0 and np.isnan(budget.loc["scatter", "probability"])
 

@@ -57,7 +57,7 @@ def _checked(found):
     return found
 
 
-def _gauge_free(name, effect):
+def _identifiable(name, effect):
     """The effect without what the calibration's own tied lengths are: the part of an asymmetry that all legs share."""
     if name != "leg_asymmetry":
         return effect
@@ -68,14 +68,14 @@ def _gauge_free(name, effect):
 @cache
 def _of_one(name):
     """Verdict and tables of the diagnosis of one effect, at a gap of four times the noise."""
-    found = diagnosed(measure((_gauge_free(name, strong(name, 4.0)),)), details=True)
+    found = diagnosed(measure((_identifiable(name, strong(name, 4.0)),)), details=True)
     return _checked(found).verdict, found.tables
 
 
 @pytest.mark.parametrize("name", list(EFFECTS))
 def test_each_effect_is_named_and_its_numbers_are_recovered(name):
     """At a gap of four times the noise, all numbers within four standard errors."""
-    effect = _gauge_free(name, strong(name, 4.0))
+    effect = _identifiable(name, strong(name, 4.0))
     verdict, tables = _of_one(name)
     assert verdict["effects"] == name and verdict["leg"] == 0 and verdict["noise_from"] == "fitted"
     assert verdict["share_closed"] > 0.85 and verdict["gap_after_rms_mm"] < 0.5 * NOISE_RMS_MM < verdict["gap_rms_mm"]

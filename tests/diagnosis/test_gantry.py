@@ -25,7 +25,7 @@ def _off(numbers, errors, name, true):
     return abs(numbers[name] - true) / errors[name]
 
 
-def test_play_of_a_drive_that_holds_along_two_sides_of_a_rectangle_is_found():
+def test_backlash_of_a_drive_that_holds_along_two_sides_of_a_rectangle_is_found():
     found, numbers, errors = _diagnosed(campaign(backlash_mm=(0.08, 0.0, 0.0)))
     assert found.verdict["effects"] == "backlash" and found.verdict["leg"] == 1
     assert _off(numbers, errors, "width1", 0.08) < 3.0 and errors["width1"] < 0.002

@@ -47,7 +47,7 @@ def test_a_turn_resolves_whole_orders():
 
 
 @pytest.mark.parametrize(("ratio", "seed"), [(5.5, 1), (17.3, 2), (41.0, 3), (93.0, 4)])
-def test_a_ratio_that_nobody_states_is_found(ratio, seed):
+def test_a_ratio_that_is_not_stated_is_found(ratio, seed):
     result = diagnosed(measure((_geared(ratio, seed),), seed=seed))
     assert result.verdict["effects"] == "transmission_error"
     case = result.inference.case

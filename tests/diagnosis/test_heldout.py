@@ -114,7 +114,7 @@ def test_folds_are_runs_where_every_trajectory_was_driven_twice_else_stretches(f
         )
 
 
-def test_predictions_of_a_true_law_miss_by_noise_and_their_own_uncertainty(full):
+def test_errors_of_predictions_by_a_true_effect_are_noise_and_their_own_uncertainty(full):
     found = full.predict((EffectTerm("leg_asymmetry"),), [3.0], 0)
     expected = 3.0 * NOISE_MM**2 + found.uncertainty_mm2
     ratio = ((found.residual_mm**2).sum(axis=1) / expected).mean()

@@ -79,7 +79,7 @@ def _state(name, shape, seed=3, size=1.0):
 
 
 @pytest.mark.parametrize("name", EFFECTS)
-def test_the_corrected_sim_is_the_virtual_robot_with_the_same_numbers(case, name):
+def test_the_corrected_model_is_the_virtual_robot_with_the_same_numbers(case, name):
     """On the same motion to the solver's accuracy, on the motion as driven up to what the columns do not determine."""
     shape = len(EFFECTS[name].coordinates.shapes) - 1
     state = _state(name, shape)
@@ -92,14 +92,14 @@ def test_the_corrected_sim_is_the_virtual_robot_with_the_same_numbers(case, name
     assert size > 0.0 and np.median(np.abs(found - driven[case.used])) < 0.03 * size
 
 
-def test_without_effects_the_corrected_sim_is_the_calibrated_one(case):
+def test_without_effects_the_corrected_model_is_the_calibrated_one(case):
     np.testing.assert_allclose(
         _exact(case, State(STATE_ERRORS, {})), case.model_positions(STATE_ERRORS)[case.used], atol=1e-7
     )
 
 
 @pytest.mark.parametrize("name", EFFECTS)
-def test_signatures_are_secants_of_the_exact_sim(case, name):
+def test_signatures_are_secants_of_the_exact_model(case, name):
     """Every coordinate of every shape, over its typical size, to first order in the closure."""
     effect, plain = EFFECTS[name], State(STATE_ERRORS, {})
     linear, still = case.linearise(plain), _exact(case, plain)
@@ -114,7 +114,7 @@ def test_signatures_are_secants_of_the_exact_sim(case, name):
             assert off < max(0.01 * np.abs(slope).max() * typical, least), (shape, k)
 
 
-def test_the_calibrations_columns_are_derivatives_of_the_sim(case):
+def test_the_calibrations_columns_are_derivatives_of_the_model(case):
     base = case.linearise(State(STATE_ERRORS, {})).base
     for k, step in enumerate([1e-5] * 3 + [1e-2] * 4):
         change = np.eye(7)[k] * step
@@ -159,7 +159,7 @@ def test_stepping_a_shape_parameter_is_what_the_last_column_says(case):
     )
 
 
-def test_what_the_columns_do_not_tell_is_not_tested():
+def test_what_the_columns_do_not_determine_is_not_tested():
     frame = measure()
     for column, lost in (
         ("time_s", {"thermal_growth", "servo_lag", "base_drift"}),
@@ -171,7 +171,7 @@ def test_what_the_columns_do_not_tell_is_not_tested():
         assert all(note.startswith("needs ") for note in case.untestable.values())
 
 
-def test_times_that_are_all_alike_tell_nothing():
+def test_times_that_are_all_alike_determine_nothing():
     case = case_of(measure().assign(time_s=5.0))
     assert {"thermal_growth", "servo_lag", "base_drift"} == set(case.untestable) & set(EFFECTS)
     assert case.untestable["thermal_growth"] == "needs time_s of more than one value"
@@ -183,7 +183,7 @@ def test_a_calibration_without_noise_finds_the_robots_errors():
     assert found.effects == {}
 
 
-def test_a_sim_without_a_pose_is_an_error_that_says_so(case):
+def test_a_model_without_a_pose_is_an_error_that_says_so(case):
     lost = State(STATE_ERRORS, {("leg_asymmetry", 0): np.tile([0.0, 0.0, -700.0], 3)})
     with pytest.raises(FitError, match="has no pose at"):
         case.linearise(lost)
@@ -194,7 +194,7 @@ def test_campaigns_are_as_strong_as_they_say():
         assert campaigns.gap_mm((campaigns.strong(name, 4.0),)) == pytest.approx(4.0 * campaigns.NOISE_RMS_MM, rel=0.02)
 
 
-def test_a_state_tells_a_shape_that_was_searched_without_a_library_that_lists_it():
+def test_a_state_has_a_shape_that_was_searched_without_a_library_that_lists_it():
     state = State(np.zeros(1), {("transmission_error", 7): np.zeros(6)}, {"transmission_error": {"ratio": 4.2}})
     assert state.shape(EFFECTS, ("transmission_error", 7)) == {"ratio": 4.2}
     assert state.shape(EFFECTS, ("transmission_error", 0)) == {"ratio": 50.0}

@@ -183,7 +183,7 @@ def _twins():
     return case, calibrate(case)
 
 
-def test_what_no_run_tells_apart_shares_the_probability(twins):
+def test_what_no_run_separates_shares_the_probability(twins):
     found, verdict, _ = twins
     assert found.posterior.marginal("own_weight") == pytest.approx(
         found.posterior.marginal("drive_compliance"), rel=1e-2
@@ -196,14 +196,14 @@ def test_it_still_does_once_one_of_them_has_been_fitted():
     assert posterior.marginal("own_weight") == pytest.approx(posterior.marginal("drive_compliance"), rel=0.1)
 
 
-def test_a_payload_is_advised_where_only_a_payload_tells(twins):
+def test_a_payload_is_advised_where_only_a_payload_decides(twins):
     _, _, table = twins
     assert (table["payload_kg"] > 0.0).all() and len(table) and table["gain_nats"].is_monotonic_decreasing
     assert table["now_nats"].iloc[0] < 0.01 * table["gain_nats"].iloc[0]
     assert table["run"].str.contains("5 kg payload").all()
 
 
-def test_without_the_payload_that_alone_tells_nothing_decides_and_the_limit_is_said(twins):
+def test_without_the_only_decisive_payload_nothing_decides_and_the_limit_is_said(twins):
     found, verdict, _ = twins
     none = advise(found, verdict, MASSES, StatedLimits(payload_kg=0.0))
     sides = [set(side.split("+")) for side in none.undecided.split(" / ")]
@@ -215,7 +215,7 @@ def test_without_the_payload_that_alone_tells_nothing_decides_and_the_limit_is_s
     assert sure.undecided == ""
 
 
-def test_runs_that_split_a_group_come_before_those_that_tell_more_of_something_else(twins):
+def test_runs_that_split_a_group_come_before_more_informative_ones_on_something_else(twins):
     found, verdict, _ = twins
     group = Group(tuple(sorted(TWINS)), 0.99)
     runs = advise(found, replace(verdict, effects=("drive_compliance",), groups=(group,)), MASSES).runs

@@ -37,7 +37,7 @@ def test_the_noise_of_a_short_campaign_is_the_stated_one(acting, count):
         assert shares.sum() == pytest.approx(1.0, abs=0.02) and shares.max() < 1.05
 
 
-def test_a_noise_that_contradicts_the_stated_one_says_nothing_of_a_repeatability_that_nobody_measured():
+def test_a_noise_that_contradicts_the_stated_one_says_nothing_of_a_repeatability_that_was_not_measured():
     frame = arms.measure((), 200, 5, (4.0 * _NOISE_MM, 1e-4))
     frame = frame.drop(columns=[name for name in frame if name.startswith("measured_r")])
     known = MeasuredRobot(arms.reading(frame), arms.MASSES, _NOISE_MM)

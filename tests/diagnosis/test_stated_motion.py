@@ -79,7 +79,7 @@ def test_backlash_has_its_width_where_the_motion_is_stated(tmp_path, order, betw
     np.testing.assert_allclose(widths["value"], _WIDTH_MM, atol=0.006)
 
 
-def test_a_way_that_nobody_states_leaves_open_where_straight_tool_and_straight_drives_differ(tmp_path):
+def test_a_way_that_is_not_stated_leaves_open_where_straight_tool_and_straight_drives_differ(tmp_path):
     """What stays known is right whichever way was taken."""
     frame = hexapod_stops.file_of("random", "tool")
     motion = _case(_read(tmp_path, frame, "stop_and_go")).motion

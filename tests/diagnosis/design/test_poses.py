@@ -135,7 +135,7 @@ def test_advised_poses_keep_the_limits(between, rivals):
     assert none.limited == "runs are proposed within the limits minutes 0.01"
 
 
-def test_poses_tell_what_no_trajectory_does(between):
+def test_poses_decide_what_no_trajectory_does(between):
     assert between.runs["kind"].tolist() == ["poses"]
     assert between.runs["separates"].str.contains("local_compliance").all()
     row, listed = between.runs.iloc[0], between.poses
