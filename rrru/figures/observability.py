@@ -15,6 +15,10 @@ _QUANTILE_95 = 1.959964
 _NARROW = 44
 # with more parameters there is no room for numbers, and names stand upright
 _ROOM_FOR = 9
+# with more parameters each calibration has the full width
+_ROOM_FOR_TWO = 16
+# height of a row whose number can be read, and size of the letters of many rows
+_ROW_MM, _SMALL = 2.8, 6.0
 
 
 @style.printed
@@ -26,19 +30,21 @@ def observability(tables, options):
     rows = choose.of_campaign(tables, "observability", options["campaign"], "observability")
     rows = rows.assign(half_mm=_QUANTILE_95 * rows["standard_error_mm"])
     names = list(dict.fromkeys(rows["calibration"]))
-    widths = [2.6, 1.0] * min(len(names), 2)
-    crowded = rows["parameter"].nunique() > _ROOM_FOR
-    figure, panels = style.panel_grid(len(names), 80.0 if crowded else 58.0, each=2, width_ratios=widths)
+    count = rows["parameter"].nunique()
+    height_mm = max(80.0, 40.0 + _ROW_MM * count) if count > _ROOM_FOR else 58.0
+    wide = count > _ROOM_FOR_TWO
+    widths = [2.6, 1.0] * (1 if wide else min(len(names), 2))
+    figure, panels = style.panel_grid(len(names), height_mm, each=2, wide=wide, width_ratios=widths)
     limits = _error_limits(rows["half_mm"])
     for place, (name, (weights, errors)) in enumerate(zip(names, panels, strict=True)):
         part = rows[rows["calibration"] == name]
         image = _weights(weights, part)
         weights.set_title(f"({chr(97 + place)}) {choose.calibration_label(name)}")
-        weights.set_ylabel("" if place % 2 else "direction, best seen first")
+        weights.set_ylabel("" if place % 2 and not wide else "direction, best seen first")
         _errors(errors, part, limits)
     bar = figure.colorbar(image, ax=figure.axes, location="top", fraction=0.03, aspect=50, shrink=0.6)
     label = "size of the weight in the unit direction (angles as arcs at the robot's own length)"
-    bar.set_label(label if len(names) > 1 else fill(label, _NARROW))
+    bar.set_label(label if wide or len(names) > 1 else fill(label, _NARROW))
     return figure
 
 
@@ -52,9 +58,9 @@ def _weights(axes, part):
             text = f"{weight:+.2f}".replace("0.", ".", 1).replace("-", "\N{MINUS SIGN}")
             color = "white" if abs(weight) > 0.6 else "black"
             axes.text(column, row, text, ha="center", va="center", fontsize=7.0, color=color, in_layout=False)
-    crowded = {"rotation": 90.0, "fontsize": 6.0} if len(parameters) > _ROOM_FOR else {}
+    crowded = {"rotation": 90.0, "fontsize": _SMALL} if len(parameters) > _ROOM_FOR else {}
     axes.set_xticks(range(len(parameters)), [choose.parameter_label(name) for name in parameters], **crowded)
-    axes.set_yticks(range(len(table)), table.index)
+    axes.set_yticks(range(len(table)), table.index, **({"fontsize": _SMALL} if crowded else {}))
     axes.tick_params(length=0.0)
     axes.set_xlabel("error parameter")
     return image
@@ -70,9 +76,10 @@ def _errors(axes, part, limits):
     for row in rows[~seen]:
         axes.text(0.5, row, "not seen", transform=axes.get_yaxis_transform(), ha="center", va="center", fontsize=7.0)
     axes.set(xscale="log", xlim=limits, ylim=(len(directions) - 0.5, -0.5))
-    axes.set_yticks(rows, [_short(value) for value in directions["singular_value"]])
+    many = {"fontsize": _SMALL} if len(rows) > _ROOM_FOR else {}
+    axes.set_yticks(rows, [_short(value) for value in directions["singular_value"]], **many)
     axes.yaxis.tick_right()
-    axes.xaxis.set_major_locator(LogLocator(numticks=4))
+    axes.xaxis.set_major_locator(LogLocator(numticks=3))
     style.plain_log(axes.xaxis)
     axes.tick_params(axis="y", length=0.0)
     axes.set_xlabel("95 %: ± (mm)")

@@ -112,14 +112,15 @@ def legend_above(figure, axes, columns=5, side="upper"):
     figure.legend(entries.values(), entries.keys(), **place)
 
 
-def panel_grid(count, row_mm, above_mm=14.0, each=1, **options):
+def panel_grid(count, row_mm, above_mm=14.0, each=1, wide=False, **options):
     """A figure with `each` axes side by side per panel, two panels a row: the figure and the axes (count, each) in use.
 
-    row_mm, above_mm: heights of a row of panels and of what stands above them; one panel makes a narrow figure.
+    row_mm, above_mm: heights of a row of panels and of what stands above them; one panel makes a narrow figure. wide:
+    whether each panel has a row of its own, of full width.
     """
-    columns = min(count, 2)
+    columns = 1 if wide else min(count, 2)
     rows = -(-count // columns)
-    figure = new(DOUBLE_MM if columns > 1 else SINGLE_MM, above_mm + row_mm * rows)
+    figure = new(DOUBLE_MM if wide or columns > 1 else SINGLE_MM, above_mm + row_mm * rows)
     panels = figure.subplots(rows, each * columns, squeeze=False, **options).reshape(-1, each)
     for axes in panels[count:].ravel():
         axes.set_axis_off()

@@ -5,15 +5,17 @@ import os
 import re
 import subprocess
 import sys
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.text import Text
 
 from rrru.errors import ConfigError, RrruError, WriteError
-from rrru.figures import choose, style
+from rrru.figures import choose, observability, style
 from tests.figures import synthetic_gap
 from tests.figures import synthetic_tables as synthetic
 from tests.figures.catalogue import FIGURES
@@ -345,3 +347,27 @@ def test_figures_know_no_computing_package():
             names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
             names += [node.module] if isinstance(node, ast.ImportFrom) else []
             assert all(allowed.match(name) for name in names), f"{path.name}: {names}"
+
+
+def test_the_names_of_many_parameters_do_not_overlap():
+    """Of a robot of 39 numbers; names and singular values of half the width ran into each other."""
+    count, generator = 39, np.random.default_rng(3)
+    direction, number = (part.ravel() for part in np.indices((count, count)))
+    rows = pd.DataFrame(
+        {
+            "campaign": synthetic.CAMPAIGN,
+            "calibration": "*",
+            "direction": direction + 1,
+            "parameter": [f"leg_{k % 6 + 1}_ball_{'xyz'[k % 3]}{k}" for k in number],
+            "weight": generator.uniform(-1.0, 1.0, count**2),
+            "singular_value": 10.0 / (direction + 1.0),
+            "standard_error_mm": 1e-3 * (direction + 1.0),
+        }
+    )
+    figure = observability.observability({"observability": rows}, {"campaign": synthetic.CAMPAIGN})
+    figure.canvas.draw()
+    for axes, along in [(axes, along) for axes in figure.axes[:2] for along in ("x", "y")]:
+        labels = axes.get_xticklabels() if along == "x" else axes.get_yticklabels()
+        extents = [one.get_window_extent() for one in labels if one.get_text()]
+        boxes = sorted((getattr(one, f"{along}0"), getattr(one, f"{along}1")) for one in extents)
+        assert all(end <= start + 1.0 for (_, end), (start, _) in pairwise(boxes)), along
