@@ -18,7 +18,7 @@ from rrru.simulation.virtual_robot import VirtualRobot
 from rrru.studies.blind_validation import draw
 from rrru.studies.blind_validation.chunks import Member, check, chunks, noise_of
 from rrru.studies.blind_validation.members import robot_of
-from rrru.studies.blind_validation.noise import NOISES, NoiseLaw
+from rrru.studies.blind_validation.noise import NOISES, NoiseModel
 from rrru.studies.blind_validation.oracle import limits, with_truth
 from rrru.studies.blind_validation.outside import EFFECTS, OUTSIDE
 from rrru.studies.blind_validation.robots import noise_free, true_gap_mm
@@ -149,7 +149,7 @@ def test_a_cause_from_outside_is_physical_and_nothing_in_the_library_imitates_it
     moved, _ = virtual.positions(motion, motion.position_mm)
     still, _ = VirtualRobot(mechanism=_MECHANISM).positions(motion, motion.position_mm)
     at = _MECHANISM.map_at(motion.drive, motion.position_mm)
-    first = at.move(acting.law.contribute(motion, acting.values).twists)
+    first = at.move(acting.effect_model.contribute(motion, acting.values).twists)
     np.testing.assert_allclose(moved - still, first, atol=0.02 * np.abs(first).max())
     measurements, _ = campaign.run()
     deviations, _ = _calibrated(measurements)
@@ -223,7 +223,7 @@ def test_causes_of_a_robot_as_they_are_are_as_strong_as_they_say():
     assert robot.background[0].strength > 0.0
     # what is read is off by more than the exact places are
     off = rows.measured(robot.measured(CONDITIONS)) - rows.measured(noise_free(robot, CONDITIONS))
-    law = NoiseLaw(**robot.noise)
+    law = NoiseModel(**robot.noise)
     own = (law.size * np.array(law.axes)) ** 2 + law.scatter**2 + law.runs**2
     np.testing.assert_allclose(off.std(axis=0) / CONDITIONS.noise_mm, np.sqrt(own), rtol=0.35)
 

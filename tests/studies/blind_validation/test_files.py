@@ -15,7 +15,7 @@ from rrru.studies.blind_validation.chunks import Member
 from rrru.studies.blind_validation.draw import MANY
 from rrru.studies.blind_validation.faults import KINDS, Fault, draw_fault, kinds_of
 from rrru.studies.blind_validation.members import drawn, robot_of
-from rrru.studies.blind_validation.noise import NoiseLaw
+from rrru.studies.blind_validation.noise import NoiseModel
 from rrru.studies.blind_validation.parts import parts
 from rrru.studies.blind_validation.plants import mujoco
 from rrru.studies.blind_validation.verdicts import NONE, PREFIX
@@ -136,7 +136,7 @@ def test_a_campaign_has_what_tells_causes_apart_and_fresh_runs_go_elsewhere():
 def test_a_fault_that_the_calibration_takes_up_cannot_be_sized():
     """Legs that always push never change sides of their clearance: it is a length."""
     fault = Fault("clearance", (0.1,) * 6, {})
-    with pytest.raises(UnreachableError, match="a calibration takes up clearance"):
+    with pytest.raises(UnreachableError, match="a calibration absorbs clearance"):
         foreign.sized(short("own", "hexapod_file"), fault, 3.0, conditions("hexapod_file"))
 
 
@@ -174,7 +174,7 @@ def test_a_robot_of_a_file_as_robots_are_has_several_causes_of_its_own(file, num
     listed = parts(robot, "none", _budget(), known.noise_rms_mm).set_index("part")
     for one in robot.acting:
         assert listed.loc[one.effect, "strength"] == one.strength
-    assert listed.loc["scatter", "strength"] == NoiseLaw(**robot.noise).beyond
+    assert listed.loc["scatter", "strength"] == NoiseModel(**robot.noise).beyond
 
 
 def test_axes_of_a_robot_of_a_file_as_robots_are_are_found_by_its_calibration():

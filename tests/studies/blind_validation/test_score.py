@@ -19,7 +19,7 @@ from rrru.studies.blind_validation.members import Known
 from rrru.studies.blind_validation.oracle import limits, with_truth
 from rrru.studies.blind_validation.outside import EFFECTS
 from rrru.studies.blind_validation.robots import noise_free
-from rrru.studies.blind_validation.score import _known, score_chunk
+from rrru.studies.blind_validation.score import _rivals, score_chunk
 from rrru.studies.blind_validation.states import state_of, state_row
 from rrru.studies.blind_validation.summary import calibration_error, confusion, summary, wilson
 from rrru.studies.blind_validation.verdicts import is_right
@@ -99,9 +99,9 @@ def test_many_causes_are_scored_by_their_parts_and_have_no_limits(robots, effect
 
 def test_what_holds_an_effect_goes_with_it():
     library = {name: _LIBRARY[name] for name in ("leg_asymmetry", "joint_axis_error", "backlash")}
-    assert _known(library, "leg_asymmetry") == ["backlash"]
+    assert _rivals(library, "leg_asymmetry") == ["backlash"]
     many = {"drive_error_function", "transmission_orders"}
-    assert set(_known(_LIBRARY, "")) == set(_LIBRARY) - many
+    assert set(_rivals(_LIBRARY, "")) == set(_LIBRARY) - many
 
 
 @pytest.mark.parametrize(
