@@ -202,7 +202,7 @@ def _strength(axes, scores, checks):
     axes.set(xscale="log", xlabel="gap over noise, rms", ylabel="share of robots", ylim=(-0.03, 1.03))
     axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 3.0)))
     style.plain_log(axes.xaxis)
-    axes.set_title("correct verdicts, by gap over noise")
+    axes.set_title("correct verdicts, by strength of the gap")
 
 
 def _closed(axes, scores, checks):

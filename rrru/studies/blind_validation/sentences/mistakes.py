@@ -211,7 +211,7 @@ def with_mistake(number, seed, most_stops):
 
 
 def right_draw(number, seed, most_stops, label):
-    """A Draw without a cause, of a stream of its own."""
+    """A Draw without a cause, from a separate stream."""
     return replace(draw(number, stream(seed, label).integers(2**31), most_stops, 0.0), cause=None)
 
 
