@@ -1,4 +1,4 @@
-"""All groups, each in a process of its own; then the table, the figure and the page: `make bench`."""
+"""All groups, each in a separate process; then the table, the figure and the page: `make bench`."""
 
 import subprocess
 import sys
@@ -8,12 +8,12 @@ from benchmarks import harness, page
 from rrru.store import tables
 
 GROUPS = ("objective", "genetic", "least_squares", "solver", "kinematics", "sysid", "diagnosis", "workflow")
-# measured only where they are asked for by name: they take an hour or more, and have tables of their own
+# run only by name: they take an hour or more, and have separate tables
 LONG_GROUPS = ("coverage", "noise_found")
 
 
 def main(groups):
-    """Measure groups, by default all but the long ones, and tell them with what was measured before of the others."""
+    """Run groups, by default all except the long ones, and write the page with the last results of the others."""
     if unknown := set(groups) - set(GROUPS):
         sys.exit(f"no group {unknown.pop()!r}; allowed: {', '.join(GROUPS)}")
     here = Path(__file__).parent
@@ -23,7 +23,7 @@ def main(groups):
     parts = [path for path in map(harness.part, GROUPS) if path.exists()]
     whole = harness.RESULTS / harness.TABLE.path
     tables.gather(parts, whole)
-    page.tell(tables.read(whole))
+    page.write_page(tables.read(whole))
 
 
 if __name__ == "__main__":

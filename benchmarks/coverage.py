@@ -12,7 +12,7 @@ independent directions u = L^-1 error, L L' = C, of the combinations that the po
 standard error of the coverage holds. Of parameters it is taken over draws.
 
 The noise of a few draws may happen to be kind: where nothing acts the directions have a row "oracle" for the linear
-generalised least squares of the same readings under the true covariance, whose ratio is 1 but for that, and a row
+generalised least squares of the same readings under the true covariance, whose ratio is 1 except for that, and a row
 "same draws" for the diagnosis.
 
     python -m benchmarks.coverage --draws 200 --robot arm7 --scene ar1 --scene white
@@ -58,7 +58,7 @@ class Statement:
 
     table: `gap_parameters`; covariance (p, p): of the geometric parameters; effects: in the verdict; held_out_mm:
     predicted rms distance of held-out readings, noise included; gap_after_mm: without noise; legs: of each term of the
-    hypothesis; predict: from another table of readings to what the corrected model leaves of it.
+    hypothesis; predict: residuals of the corrected model from another table of readings.
     """
 
     table: pd.DataFrame
@@ -77,9 +77,10 @@ def state_of(campaign, frame, noise_mm, draws=_RESAMPLES):
     known = MeasuredRobot(campaign.mechanism, campaign.masses, noise_mm)
     settings = GapSettings(effects=campaign.library.offered, draws=draws)
     found = diagnose(frame, known, settings, details=False)
-    one, estimate = found.inference, found.inference.fit.estimate
-    terms, geometry = one.hypothesis.terms, estimate.parameters.places[GEOMETRY]
-    prediction = one.held_out.predict(terms, one.hypothesis.strengths_of(terms, one.level), one.level)
+    inference, estimate = found.inference, found.inference.fit.estimate
+    terms, geometry = inference.hypothesis.terms, estimate.parameters.places[GEOMETRY]
+    strengths = inference.hypothesis.strengths_of(terms, inference.level)
+    prediction = inference.held_out.predict(terms, strengths, inference.level)
     expected = np.sum(prediction.left_mm2, axis=1) + prediction.uncertainty_mm2
     names = found.verdict["effects"].split("+")
     return Statement(
@@ -90,13 +91,13 @@ def state_of(campaign, frame, noise_mm, draws=_RESAMPLES):
         float(np.sqrt(expected.mean())),
         found.verdict["gap_after_rms_mm"],
         ",".join(str(term.legs) for term in terms),
-        one.case.used,
-        lambda frame: _residual(campaign, frame, one),
+        inference.case.used,
+        lambda frame: _residual(campaign, frame, inference),
     )
 
 
 def _residual(campaign, frame, inference):
-    """What the corrected model leaves (n, 3) of another table of readings, where a diagnosis would use them."""
+    """Residuals (n, 3) of the corrected model on another table of readings, NaN where a diagnosis rejects them."""
     case = make_case(frame, sim(campaign.mechanism), campaign.masses, 1.0, {})
     case = replace(case, library=inference.case.library).standing(inference.state)
     return np.where(case.used[:, None], case.left(inference.state), np.nan)
@@ -106,7 +107,7 @@ def _residual(campaign, frame, inference):
 
 
 def one_draw(robot, scene, number, size=1.0):
-    """What one draw shows: rows of its parameters, of its independent directions, and its summary.
+    """The results of one draw: rows of its parameters, of its independent directions, and its summary.
 
     The effect of the library acts in every second draw; with payload and tilt unknown, in all.
     """
@@ -151,7 +152,7 @@ def one_draw(robot, scene, number, size=1.0):
 
 
 def _rms(vectors):
-    """Root mean square length of vectors (n, 3), those that are not known apart."""
+    """Root mean square length of vectors (n, 3), without NaN."""
     return float(np.sqrt(np.nanmean((vectors**2).sum(axis=1))))
 
 
@@ -175,7 +176,7 @@ def _parameter_rows(stated, campaign, truth):
         elif kind == "nuisance":
             true = truth.payload.get(row.parameter, 0.0)
         else:
-            # of an effect that does not act its sizes are zero, of its shape there is no truth
+            # an effect that does not act has sizes of zero and no true shape
             true = effects[row.effect].get(row.parameter) if row.effect in effects else 0.0
             true = None if (row.effect, row.parameter) in unseen else true
         if true is None or (kind == "effect" and np.isnan(row.low_95)):
@@ -207,7 +208,7 @@ def _directions(stated, campaign, truth):
 
 
 def oracle(campaign, frame, truth, used):
-    """Errors over standard errors (r,) of linear generalised least squares under the true covariance; used (n,)."""
+    """Errors over standard errors (r,) of linear generalised least squares with the true covariance; used (n,)."""
     error = frame[[f"measured_{axis}_mm" for axis in "xyz"]].to_numpy() - exact_readings(campaign, truth)
     rows_of_run = pd.Series(np.arange(len(frame))).groupby(series(frame)).indices
     columns = campaign.jacobian * campaign.scale @ campaign.identifiable
@@ -226,11 +227,11 @@ def oracle(campaign, frame, truth, used):
 
 
 def cell(robot, scene, draws, size=1.0, first=0):
-    """Tables of parameters, directions and summaries of so many draws of a cell."""
+    """Tables of parameters, directions and summaries of a number of draws of a cell."""
     parameters, directions, summaries = [], [], []
     for number in range(first, first + draws):
-        own, independent, summary = one_draw(robot, scene, number, size)
-        parameters += [row | {"draw": number} for row in own]
+        stated, independent, summary = one_draw(robot, scene, number, size)
+        parameters += [row | {"draw": number} for row in stated]
         directions += [row | {"draw": number, "direction": k} for k, row in enumerate(independent)]
         summaries.append(summary)
     tables = [pd.DataFrame(part) for part in (parameters, directions, summaries)]
@@ -238,15 +239,15 @@ def cell(robot, scene, draws, size=1.0, first=0):
 
 
 def coverage(z, draw, held=None):
-    """Of errors over standard errors (n,) in draws (n,): coverage, its standard error over draws, rms ratio.
+    """Coverage, its standard error over draws, and rms ratio, of errors over standard errors (n,) in draws (n,).
 
     held (n,): whether the stated interval holds the truth, None for intervals of 1.96 standard errors.
     """
     held = np.abs(z) < QUANTILE_95 if held is None else np.asarray(held, dtype=bool)
     covered = pd.Series(held).groupby(np.asarray(draw))
     rate, count = float(held.mean()), covered.ngroups
-    own = covered.mean()
-    error = float(own.std(ddof=1) / np.sqrt(count)) if count > 1 else np.nan
+    rates = covered.mean()
+    error = float(rates.std(ddof=1) / np.sqrt(count)) if count > 1 else np.nan
     return rate, error, float(np.sqrt(np.nanmean(np.square(z))))
 
 
@@ -268,7 +269,7 @@ def summarize(parameters, directions, summaries):
 
 
 def _errors_by_kind(parameters, directions):
-    """Kind, rows and errors over standard errors (n,) of what tables of one cell hold."""
+    """Kind, rows and errors over standard errors (n,) in the tables of one cell."""
     if len(directions):
         yield "directions", directions, directions["z"].to_numpy(dtype=float)
     if "oracle" in directions and directions["oracle"].notna().any():
@@ -282,7 +283,7 @@ def _errors_by_kind(parameters, directions):
 
 
 def _done(summaries):
-    """Which draws (n,) have a diagnosis; an empty text comes back from a file as NaN."""
+    """Flags (n,) of the draws with a diagnosis; an empty text is NaN when read from a file."""
     return summaries["failed"].isna() | (summaries["failed"] == "")
 
 
@@ -309,9 +310,10 @@ def predictions(summaries):
     good = summaries[_done(summaries)]
     for (robot, scene), own in good.groupby(["robot", "scene"], sort=False):
         row = {"robot": robot, "scene": scene, "draws": len(own)}
-        for name, told, seen in (("held_out", "held_out_mm", "fresh_mm"), ("gap", "gap_after_mm", "fresh_gap_mm")):
-            row[f"{name}_ratio"] = float(np.sqrt((own[told] ** 2).mean() / (own[seen] ** 2).mean()))
-            row[f"{name}_median"] = float((own[told] / own[seen]).median())
+        pairs = (("held_out", "held_out_mm", "fresh_mm"), ("gap", "gap_after_mm", "fresh_gap_mm"))
+        for name, predicted, observed in pairs:
+            row[f"{name}_ratio"] = float(np.sqrt((own[predicted] ** 2).mean() / (own[observed] ** 2).mean()))
+            row[f"{name}_median"] = float((own[predicted] / own[observed]).median())
         row["noise_mm"], row["noise_runs_mm"] = own["noise_mm"].median(), own["noise_runs_mm"].median()
         row["seconds"] = own["seconds"].median()
         result.append(row)
@@ -319,14 +321,14 @@ def predictions(summaries):
 
 
 def main(arguments=None):
-    """Measure cells, three files each, and print what they show."""
+    """Run cells, three files each, and print their results."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--draws", type=int, default=200)
     parser.add_argument("--robot", action="append", choices=ROBOTS)
     parser.add_argument("--scene", action="append", choices=SCENES)
     parser.add_argument("--size", type=float, default=1.0, help="share of the usual number of poses")
     parser.add_argument("--label", default="now", help="folder of the results, such as before or after")
-    parser.add_argument("--show", action="store_true", help="print what the files of the folder show, measure nothing")
+    parser.add_argument("--show", action="store_true", help="print the results of the folder's files without a run")
     asked = parser.parse_args(arguments)
     folder = FOLDER / asked.label
     folder.mkdir(parents=True, exist_ok=True)
@@ -342,13 +344,13 @@ def main(arguments=None):
 
 
 def _stored(folder, name, cells):
-    """Tables of a name that a folder holds of some cells."""
+    """Stored tables of a name for some cells."""
     paths = [folder / f"{robot}-{scene}-{name}.csv" for robot, scene in cells]
     return [pd.read_csv(path) for path in paths if path.exists() and path.stat().st_size > 1]
 
 
 def print_cells(tables):
-    """Print what tables of parameters, directions and summaries show."""
+    """Print the results of tables of parameters, directions and summaries."""
     parameters, directions, summaries = tables
     with pd.option_context("display.width", 250, "display.max_columns", 40, "display.float_format", "{:.3g}".format):
         for table in (summarize(parameters, directions, summaries), predictions(summaries)):

@@ -1,8 +1,8 @@
-"""Diagnoses: seconds and memory by the number of points, and of many campaigns one after the other.
+"""Diagnoses: seconds and memory by the number of points, and for many campaigns in sequence.
 
 Points: the same drawn robots of the withheld check on its short campaign (222 points), on its full one (732) and on the
-full one with more points a path (5,008), each size in a process of its own. Campaigns: ten small ones again and again
-in one process.
+full one with more points per path (5,008), each size in a separate process. Campaigns: ten small ones repeatedly in one
+process.
 """
 
 import json
@@ -26,19 +26,19 @@ from rrru.studies.blind_validation.robots import Conditions
 # kind of campaign, points of a line and of the spiral
 SIZES = {222: ("paper", 26, 40), 732: ("full", 26, 40), 5008: ("full", 178, 273)}
 _ROBOTS, _CAMPAIGNS, _GROUP = (1, 2, 4, 5, 6), (10, 100, 1000, 10000), 10
-# of the many: few points and one cause; ten thousand take an hour and a half
+# the many campaigns have few points and one cause; ten thousand take an hour and a half
 _SHORT, _FEW = ("line_1", "spiral"), ("backlash",)
-_BY_POINTS = "ratio: seconds a point over those of the same robot at 222 points"
-_BY_CAMPAIGNS = "ratio: seconds a campaign over those of the first ten; 66 points, one cause"
+_BY_POINTS = "ratio: seconds per point over those of the same robot at 222 points"
+_BY_CAMPAIGNS = "ratio: seconds per campaign over those of the first ten; 66 points, one cause"
 
 
 def known():
     """Conditions of the withheld check, and settings of the diagnosis, as configured."""
     config = yaml.safe_load((RESULTS.parent / "config.yaml").read_text())
-    own = {"robot": {"name": "rrru3", "dimensions": config["robots"]["rrru3"]}, "masses": parts.masses(config, {})}
+    section = {"robot": {"name": "rrru3", "dimensions": config["robots"]["rrru3"]}, "masses": parts.masses(config, {})}
     keys = ("seed", "motion", "withheld")
     settings = GapSettings.from_config(config["gap"], config["seed"])
-    return Conditions.from_config(own | {key: config[key] for key in keys}), settings
+    return Conditions.from_config(section | {key: config[key] for key in keys}), settings
 
 
 def measured(number, conditions, size=None):
@@ -73,7 +73,7 @@ def of_size(size):
 
 
 def of_many(count):
-    """Mean seconds of every ten of so many short campaigns, the same ten again and again, and memory after each ten."""
+    """Mean seconds of every ten of `count` short campaigns (the same ten repeatedly), and memory after each ten."""
     conditions, settings = known()
     settings, tables = replace(settings, effects=_FEW), []
     for number in range(_GROUP):
@@ -83,27 +83,27 @@ def of_many(count):
     for _ in range(count // _GROUP + 1):
         seconds.append(float(np.mean([spent(table, conditions, settings) for table in tables])))
         memory.append(harness.peak_mib())
-    # the first ten also load what is compiled
+    # the first ten include loading of compiled code
     return {"seconds": seconds[1:], "memory_mib": memory[1:]}
 
 
-def apart(what, size):
-    """What one of the two functions above tells in a process of its own."""
+def in_process(what, size):
+    """The result of one of the two functions above in a separate process."""
     command = [sys.executable, "-m", "benchmarks.diagnosis", what, str(size)]
-    told = subprocess.run(command, cwd=RESULTS.parent, check=True, capture_output=True, text=True)
-    return json.loads(told.stdout.splitlines()[-1])
+    finished = subprocess.run(command, cwd=RESULTS.parent, check=True, capture_output=True, text=True)
+    return json.loads(finished.stdout.splitlines()[-1])
 
 
 def rows():
     """Rows of the group."""
     result, first = [], None
     for size in SIZES:
-        found = apart("size", size)
+        found = in_process("size", size)
         each = np.array(found["seconds"]) / size
         first = each if first is None else first
         task, median = Task("diagnosis", "diagnosis by points", size), float(np.median(found["seconds"]))
         result.append(task.row(harness.OURS, median, each / first, memory_mib=found["memory_mib"], note=_BY_POINTS))
-    found = apart("many", max(_CAMPAIGNS))
+    found = in_process("many", max(_CAMPAIGNS))
     for count in _CAMPAIGNS:
         # the second half of the campaigns so far
         groups = count // _GROUP
@@ -118,4 +118,4 @@ if __name__ == "__main__":
     if len(sys.argv) == 3:
         print(json.dumps({"size": of_size, "many": of_many}[sys.argv[1]](int(sys.argv[2]))))
     else:
-        harness.keep("diagnosis", rows())
+        harness.store("diagnosis", rows())

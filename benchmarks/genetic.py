@@ -34,11 +34,11 @@ PEERS = {
 
 
 class Ended(Exception):
-    """A run has come to the goal, or has spent its evaluations."""
+    """A run has reached the goal, or used its evaluations."""
 
 
 class Watched:
-    """An objective over the unit box that counts what is asked of it and ends a run."""
+    """An objective over the unit box that counts its evaluations and ends a run."""
 
     def __init__(self, objective, low, high, goal):
         self.objective, self.low, self.width, self.goal = objective, low, high - low, goal
@@ -63,7 +63,7 @@ def theirs(search, box, goal, seed):
 
 
 def ours(operators, box, goal, seed):
-    """The same of our own: where it came to the goal, its share of the whole run's seconds."""
+    """The same for our own: where it reached the goal, its share of the whole run's seconds."""
     settings = GeneticSettings(operators=operators, generations=searchers.GENERATIONS, stall_generations=0)
     start = process_time()
     result = minimise(*box, settings, seed)
@@ -75,18 +75,18 @@ def ours(operators, box, goal, seed):
 
 
 def expected(runs):
-    """Seconds and evaluations spent for each run that came to the goal, of runs (.., n, 3)."""
+    """Seconds and evaluations per run that reached the goal, of runs (.., n, 3)."""
     runs = np.asarray(runs, dtype=float)
     with np.errstate(divide="ignore"):
         return np.moveaxis(runs[..., :2].sum(axis=-2) / runs[..., 2].sum(axis=-1)[..., None], -1, 0)
 
 
-def told(task, runs, name, note=""):
+def row_of_search(task, runs, name, note=""):
     """Row of a search from the runs of all by name."""
     draw = np.random.default_rng(0).integers(0, _SEEDS, (2000, _SEEDS))
     (seconds, evaluations), (own, _) = expected(runs[name]), expected(runs[harness.OURS])
     came = int(np.sum(runs[name], axis=0)[2])
-    note = "; ".join(filter(None, [f"{came} of {_SEEDS} runs came there", note]))
+    note = "; ".join(filter(None, [f"{came} of {_SEEDS} runs reached the goal", note]))
     if not came:
         return task.row(name, note=note)
     drawn, drawn_own = (expected(np.asarray(runs[one], dtype=float)[draw])[0] for one in (name, harness.OURS))
@@ -126,11 +126,11 @@ def rows():
     each = 1e3 * np.median(fsolve_s)
     notes = {
         harness.OURS: "operators: cma_es",
-        _FIRST: f"seconds reckoned: the same runs on our kernel, and {each:.2f} ms of fsolve for every evaluation",
+        _FIRST: f"seconds computed: the same runs on our kernel, and {each:.2f} ms of fsolve for every evaluation",
     }
     task = Task("genetic", "search to 1 % above least squares", len(residuals))
-    return [told(task, runs, name, notes.get(name, "")) for name in runs]
+    return [row_of_search(task, runs, name, notes.get(name, "")) for name in runs]
 
 
 if __name__ == "__main__":
-    harness.keep("genetic", rows())
+    harness.store("genetic", rows())

@@ -1,8 +1,8 @@
-"""Seconds of calls made in turns in one process, and the table that they go into.
+"""Seconds of calls made in turns in one process, and their table.
 
 The machine's speed changes from second to second, so that a figure is a ratio of two calls made one right after the
-other, and what is told of many such pairs is their median and quartiles (as pytest-benchmark does; pyperf and asv
-compare runs that lie minutes apart). Calls shorter than `_SHORTEST_S` are repeated within a pair (as timeit does).
+other, and the results of many such pairs are their median and quartiles (as pytest-benchmark does; pyperf and asv
+compare runs minutes apart). Calls shorter than `_SHORTEST_S` are repeated within a pair (as timeit does).
 """
 
 import resource
@@ -22,12 +22,12 @@ RESULTS = Path(__file__).resolve().parents[1] / "results"
 OURS = "rrru"
 TABLE = read_tables("""
 ## benchmarks | tables/benchmarks.parquet | what peer size
-Seconds of this package beside what a user would use instead, from `make bench`.
+Seconds of this package compared with alternatives, from `make bench`.
 --
 group                  str    the script of benchmarks/ that measured it
 what                   str    the task
-peer                   str    who did it
-size                   int    how large the task is: points, poses, robots, individuals or campaigns, as the task says
+peer                   str    the package
+size                   int    size of the task: points, poses, robots, individuals or campaigns, as the task says
 seconds                float? median; of a pose, a run, a fit or a campaign, as the task says; null where the peer could
     not be installed or did not reach the goal
 ratio                  float? median of the peer's seconds over this package's, of pairs made in turns; null with the
@@ -36,7 +36,7 @@ low                    float? lower quartile of the ratio
 high                   float? upper quartile of the ratio
 evaluations            float? median evaluations of the objective, of searches
 memory_mib             float? most memory of the process, where it was measured
-note                   str    what a reader has to know; empty for nothing
+note                   str    a note; empty for none
 """)[0]
 
 _SHORTEST_S, _ROUNDS, _LEAST_ROUNDS = 0.02, 15, 3
@@ -44,20 +44,20 @@ _SHORTEST_S, _ROUNDS, _LEAST_ROUNDS = 0.02, 15, 3
 
 @dataclass(frozen=True)
 class Call:
-    """What is timed: a function, and how many of the units that seconds are told for it does at once."""
+    """A timed function, and its number of units per call; seconds are per unit."""
 
     function: Callable
     units: int = 1
 
     def seconds(self, clock, loops):
-        """Seconds a unit."""
+        """Seconds per unit."""
         start = clock()
         for _ in range(loops):
             self.function()
         return (clock() - start) / (loops * self.units)
 
     def loops(self, clock):
-        """How often it has to be called to last long enough, after a first call that may compile."""
+        """Number of calls for a long enough timing, after a first call that may compile."""
         self.function()
         loops = 1
         while (spent := self.seconds(clock, loops) * loops * self.units) < _SHORTEST_S:
@@ -67,7 +67,7 @@ class Call:
 
 @dataclass(frozen=True)
 class Task:
-    """Group, what is done and its size: what the rows of one task share."""
+    """Group, task and its size: common columns of the rows of one task."""
 
     group: str
     what: str
@@ -104,16 +104,16 @@ class Task:
 
 
 def peak_mib():
-    """Most memory that this process has had."""
+    """Peak memory of this process."""
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
 
 
 def part(group):
-    """Where a group's rows are kept."""
+    """Path of a group's rows."""
     return RESULTS / "benchmarks" / f"{group}.parquet"
 
 
-def keep(group, rows):
+def store(group, rows):
     """Write a group's rows and print them."""
     frame = pd.DataFrame(rows)
     numbers = ["seconds", "ratio", "low", "high", "evaluations", "memory_mib"]

@@ -1,4 +1,4 @@
-"""Kinematics of the general model beside robotics libraries: an arm of six axes, a hexapod.
+"""Kinematics of the general model compared with robotics libraries: an arm of six axes, a hexapod.
 
 The arm: pose and Jacobian (6 x 6) of a UR10's standard DH rows, of 1000 joint vectors; the hexapod: lengths of its six
 legs at 1000 poses. Libraries that take many at once are given them at once, on one thread; the others a loop.
@@ -36,7 +36,7 @@ def ur10():
 
 
 def _rows():
-    """DH rows (6, 4) of a, alpha, d, theta, in m and rad, of the same."""
+    """DH rows (6, 4) of a, alpha, d, theta of the UR10, in m and rad."""
     section = _section()
     lengths = [[1e-3 * row.get(key, 0.0) for key in ("a_mm", "d_mm")] for row in section["dh"]]
     angles = [np.radians([row.get(key, 0.0) for key in ("alpha_deg", "theta_deg")]) for row in section["dh"]]
@@ -240,4 +240,4 @@ def _tendons(base, plate):
 
 
 if __name__ == "__main__":
-    harness.keep("kinematics", arm_rows() + legs_rows())
+    harness.store("kinematics", arm_rows() + legs_rows())

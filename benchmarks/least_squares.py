@@ -1,8 +1,8 @@
 """Calibrations by least squares: SciPy with finite differences, and here with the analytic Jacobian.
 
 Tasks: the 3-RRRU on paper A's seven lines (182 points, 7 parameters), a UR10 and a hexapod (100 points, all numbers
-that the points tell). Both are told the same forward kinematics, so that the difference is the slopes; the first robot
-also has what a user would have without this package, fsolve or NumPy. Seconds of one fit.
+that are identifiable from the points). Both use the same forward kinematics, so that the difference is the derivatives;
+the first robot also has what a user would have without this package, fsolve or NumPy. Seconds of one fit.
 """
 
 import numpy as np
@@ -21,12 +21,12 @@ _DIFFERENCES = "SciPy, finite differences, our forward kinematics"
 
 
 def fitted(function, count):
-    """Deviations (p,) by SciPy from zero on; function: deviations (p,) to positions' lacks (n, 3)."""
+    """Deviations (p,) by SciPy from zero; function: position residuals (n, 3) of deviations (p,)."""
     return least_squares(lambda deviations: function(deviations).ravel(), np.zeros(count), method="lm").x
 
 
 def measured(robot, actuators, start_mm, turn_rad=2e-4, length_mm=0.2):
-    """Residuals of a robot with small errors of all its numbers, noise on top."""
+    """Residuals of a robot with small errors of all its parameters, and noise."""
     robot, draw = robot.seen_at(actuators, start_mm), np.random.default_rng(5)
     sizes = [length_mm if unit == "mm" else turn_rad for unit in robot.parameters.units]
     real = robot.forward(actuators, sizes * draw.standard_normal(len(sizes)), start_mm)
@@ -49,7 +49,7 @@ def a_hexapod():
 
 
 def compared(what, residuals, others=None):
-    """Rows of one robot; others: functions of deviations (p,) to lacks (n, 3) by name."""
+    """Rows of one robot; others: functions of deviations (p,) to residuals (n, 3) by name."""
     count, own = len(residuals.mechanism.parameters), estimate_deviations(residuals).values
     least = (residuals.residual(own) ** 2).sum()
     functions = {_DIFFERENCES: residuals.residual} | (others or {})
@@ -77,4 +77,4 @@ def rows():
 
 
 if __name__ == "__main__":
-    harness.keep("least_squares", rows())
+    harness.store("least_squares", rows())

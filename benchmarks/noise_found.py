@@ -1,15 +1,15 @@
-"""What a diagnosis says of noise and repeatability on short campaigns: `make bench GROUPS=noise_found`.
+"""Statements of a diagnosis on noise and repeatability for short campaigns: `make bench GROUPS=noise_found`.
 
-An arm of seven axes reads 40 to 300 random poses with a stated noise of 0.03 mm per axis, which is true. The robot
-repeats: a sentence that it does not is false. In half of the files some poses are read again. Compliance, eccentricity,
-thermal growth or nothing acts, 15 campaigns each. The diagnosis is offered the whole library.
+An arm of seven axes is measured at 40 to 300 random poses with a correctly stated noise of 0.03 mm per axis. The robot
+repeats exactly: a sentence that it does not is false. In half of the files some poses are measured again. Compliance,
+eccentricity, thermal growth or nothing acts, 15 campaigns each. The diagnosis uses the whole library.
 
     python -m benchmarks.noise_found --campaigns 15
 """
 
 import os
 
-# matrices are small: more threads than one only wait for each other
+# matrices are small: more than one thread is slower
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
@@ -30,7 +30,7 @@ from rrru.seeds import stream
 
 NOISE_MM = 0.03
 ACTING = ("drive_compliance", "encoder_eccentricity", "thermal_growth", "")
-# poses that are read again where some are, and how often each is read
+# number of repeated poses, and number of readings of each
 _REPEATED, _TIMES = 10, 4
 _SEED, _RESAMPLES, _NEAR = 11, 20, 0.25
 _FALSE = ("does not repeat",)
@@ -38,7 +38,7 @@ _UNSEEN_SHARE = 0.02
 
 
 def one_campaign(acting, number, effects=None):
-    """A row of what the diagnosis of one campaign says; acting: the effect that acts, empty for none."""
+    """A row with the result of the diagnosis of one campaign; acting: the acting effect, empty for none."""
     generator = stream(_SEED, "noise found", acting, number)
     count, repeated = int(generator.integers(40, 301)), bool(number % 2)
     campaign = pose_campaign("arm7", count, NOISE_MM, acting, (_REPEATED, _TIMES) if repeated else (0, 1), generator)
@@ -109,7 +109,7 @@ def summarize(table):
 
 
 def main(arguments=None):
-    """Measure so many campaigns of each kind, write their table and print the counts."""
+    """Run a number of campaigns of each kind, write their table and print the counts."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--campaigns", type=int, default=15)
     parser.add_argument("--label", default="now", help="folder of the results, such as before or after")

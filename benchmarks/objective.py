@@ -1,7 +1,7 @@
-"""Pose solves of the calibration's objective: a loop over fsolve, NumPy, the compiled kernel, and the limit of this
-core's arithmetic.
+"""Pose solves of the calibration's objective: a loop over fsolve, NumPy, the compiled kernel, and this core's
+arithmetic limit.
 
-Task: mean distance of a population of 30 over paper A's seven lines, 182 points, 8 parameters; seconds a pose.
+Task: mean distance of a population of 30 over paper A's seven lines, 182 points, 8 parameters; seconds per pose.
 """
 
 from concurrent.futures import ProcessPoolExecutor
@@ -21,13 +21,13 @@ from rrru.robots.rrru3 import Rrru3
 POPULATION, SIDES_MM = 30, (0.0, 37.5, -37.5, 75.0, -75.0, 112.5, -112.5)
 TABLE_5 = {"dtheta1": 0.0012, "dtheta2": -0.0003, "dtheta3": 0.0003}
 TABLE_5 |= {"dL1": 0.3092, "dL2": 0.2405, "dL3": -0.1761, "dR": -1.209, "dr": 0.8865}
-# the solutions of all have to be as near
+# largest difference of solutions; convergence limit of Batch
 _SAME_MM, _LAST_STEP_MM2 = 1e-8, 1e-8
 _LOOPS, _WORKERS = 4000, 2
 
 
 def campaign(sides_mm=SIDES_MM, parameter_set="tied", noise_mm=0.3):
-    """TargetPositions of lines at the given y, measured under Table 5's errors and noise."""
+    """TargetPositions of lines at the given y, measured with Table 5's errors and noise."""
     robot = Rrru3(parameter_set=parameter_set)
     lines = line_groups((-800.0, 0.0, 600.0), (-300.0, 0.0, 600.0), sides_mm, 26)
     points = np.concatenate([sample(line) for line in lines])
@@ -43,7 +43,7 @@ def population(count=POPULATION):
 
 
 def by_fsolve(residuals, deviations):
-    """Positions (n, 3) under deviations (p,) by scipy's fsolve on eq. (8), a point after the other."""
+    """Positions (n, 3) under deviations (p,) by scipy's fsolve on eq. (8), point by point."""
     legs, (cx, cy) = residuals.mechanism.numbers(deviations), residuals.mechanism.azimuth_cos_sin
 
     def closure(p, theta):
@@ -63,7 +63,7 @@ def mean_by_fsolve(residuals, deviations):
 
 
 class Batch:
-    """The objective in NumPy, whole population at once: the kernel's algorithm, one array operation a term."""
+    """The objective in NumPy, whole population at once: the kernel's algorithm, one array operation per term."""
 
     def __init__(self, residuals):
         self.residuals, robot = residuals, residuals.mechanism
@@ -117,13 +117,13 @@ def rows():
         "SciPy fsolve, a loop over points": Call(lambda: by_fsolve(residuals, deviations[0]), len(residuals)),
         "NumPy, whole population at once": Call(lambda: batch(deviations), poses),
     }
-    own = Call(lambda: kernel(deviations), poses)
+    ours = Call(lambda: kernel(deviations), poses)
     peers[rates.LIMIT] = rates.limit_call(len(residuals))
-    return [*task.in_turns(own, peers, notes={rates.LIMIT: rates.in_words()}), *two_cores()]
+    return [*task.in_turns(ours, peers, notes={rates.LIMIT: rates.in_words()}), *two_cores()]
 
 
 def _work(_=0):
-    """Evaluate the objective for a while; when it began and ended, and seconds of this process."""
+    """Evaluate the objective for a while; returns start, end, and seconds of this process."""
     kernel, deviations = campaign().mean_distance, population()
     kernel(deviations)
     start, spent = perf_counter(), process_time()
@@ -133,7 +133,7 @@ def _work(_=0):
 
 
 def two_cores():
-    """Rows of the same work in two processes at once: how often faster than one after the other."""
+    """Rows of the same work in two simultaneous processes: speed-up over sequential ones."""
     ratios, seconds = {"wall": [], "process": []}, []
     with ProcessPoolExecutor(_WORKERS, mp_context=get_context("spawn")) as pool:
         list(pool.map(_work, range(_WORKERS)))
@@ -150,9 +150,9 @@ def two_cores():
     spent = float(np.median(seconds))
     first = [task.row(harness.OURS, spent, [1.0])]
     return first + [
-        task.row(names[clock], spent * np.median(of), of, note=notes[clock]) for clock, of in ratios.items()
+        task.row(names[clock], spent * np.median(values), values, note=notes[clock]) for clock, values in ratios.items()
     ]
 
 
 if __name__ == "__main__":
-    harness.keep("objective", rows())
+    harness.store("objective", rows())

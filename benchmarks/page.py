@@ -1,4 +1,4 @@
-"""What the benchmarks came to: the figure docs/benchmarks.png and the table of docs/benchmarks.md."""
+"""Results of the benchmarks: the figure docs/benchmarks.png and the table of docs/benchmarks.md."""
 
 import platform
 from os import cpu_count
@@ -12,17 +12,17 @@ from rrru.figures import style
 _DOCS = RESULTS.parent / "docs"
 _BEGIN, _END = "<!-- measured -->\n", "<!-- end of what was measured -->\n"
 _ROW_MM, _TITLE_ROWS, _AROUND_MM = 4.3, 1.5, 16.0
-# what is told of growth and overheads is in the table
+# growth and overheads are in the table only
 _NOT_DRAWN = ("diagnosis", "solver", "workflow")
 _UNITS = ((1.0, "s"), (1e-3, "ms"), (1e-6, "µs"), (1e-9, "ns"))
 
 
-def tell(frame):
+def write_page(frame):
     """Draw the figure of the whole table, and write the table into the page."""
     style.save(ratios({"benchmarks": frame}, {}), {"png": _DOCS / "benchmarks.png"}, "")
     page = _DOCS / "benchmarks.md"
-    before, _, rest = page.read_text().partition(_BEGIN)
-    page.write_text(before + _BEGIN + f"\nOn {machine()}:\n\n{table(frame)}\n" + _END + rest.partition(_END)[2])
+    before, _, after = page.read_text().partition(_BEGIN)
+    page.write_text(before + _BEGIN + f"\nOn {machine()}:\n\n{table(frame)}\n" + _END + after.partition(_END)[2])
 
 
 def machine():
@@ -32,34 +32,34 @@ def machine():
 
 
 def _cpuinfo():
-    """Lines that Linux tells of its processors, none elsewhere."""
+    """Lines of Linux on its processors, none on other systems."""
     path = Path("/proc/cpuinfo")
     return path.read_text().splitlines() if path.exists() else []
 
 
 def table(frame):
     """The table as Markdown."""
-    head = "| task | size | who | time | ratio | quartiles | beside |"
+    head = "| task | size | who | time | ratio | quartiles | notes |"
     rows = [head, "| --- | --- | --- | --- | --- | --- | --- |"]
     for row in frame.itertuples():
         spread = "" if np.isnan(row.ratio) or row.low == row.high else f"{_short(row.low)} to {_short(row.high)}"
-        beside = [f"{row.evaluations:,.0f} evaluations"] if row.evaluations > 0 else []
-        beside += [f"{row.memory_mib:.0f} MiB"] if row.memory_mib > 0 else []
-        beside += [row.note] if row.note else []
-        cells = row.what, f"{row.size:,}", row.peer, _time(row.seconds), _short(row.ratio), spread, "; ".join(beside)
+        notes = [f"{row.evaluations:,.0f} evaluations"] if row.evaluations > 0 else []
+        notes += [f"{row.memory_mib:.0f} MiB"] if row.memory_mib > 0 else []
+        notes += [row.note] if row.note else []
+        cells = row.what, f"{row.size:,}", row.peer, _time(row.seconds), _short(row.ratio), spread, "; ".join(notes)
         rows.append("| " + " | ".join(cells) + " |")
     return "\n".join(rows)
 
 
 def _short(number):
-    """A number in three digits, nothing where there is none."""
+    """A number with three digits, empty for NaN."""
     if np.isnan(number):
         return ""
     return f"{number:,.0f}" if number >= 1000.0 else f"{number:.3g}"
 
 
 def _time(seconds):
-    """Seconds in a unit that makes them readable."""
+    """Seconds in a readable unit."""
     if np.isnan(seconds):
         return ""
     size, unit = next((pair for pair in _UNITS if seconds >= pair[0]), _UNITS[-1])
@@ -68,7 +68,7 @@ def _time(seconds):
 
 @style.printed
 def ratios(tables, _options):
-    """Seconds of others over this package's, median and quartiles of pairs made in turns, on a log axis.
+    """Seconds of others over this package's, median and quartiles of pairs timed in turns, on a log axis.
 
     Right of 1 the others take longer.
     """
@@ -90,9 +90,9 @@ def _panel(axes, rows, task):
     spread = np.abs([middle - rows["low"], rows["high"] - middle])
     axes.axvline(1.0, **style.TOLERANCE)
     for faster, color in ((True, style.BLUE), (False, style.ORANGE)):
-        own = (middle >= 1.0) == faster
+        chosen = (middle >= 1.0) == faster
         bars = {"fmt": "o" if faster else "s", "color": color, "ecolor": style.BLACK, "capsize": 2.0}
-        axes.errorbar(middle[own], place[own], xerr=spread[:, own], elinewidth=0.7, **bars)
+        axes.errorbar(middle[chosen], place[chosen], xerr=spread[:, chosen], elinewidth=0.7, **bars)
     for row, at in zip(middle, place, strict=True):
         axes.annotate(
             _short(row),

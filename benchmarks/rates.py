@@ -1,7 +1,7 @@
-"""The arithmetic that a pose of the objective needs, at the rate that this core does each kind of it.
+"""The arithmetic of a pose of the objective, at this core's rate of each kind.
 
 Counted in `rrru.robots.rrru3_objective`: operations a point and individual, for two Newton steps. What is the same for
-all points of an individual, its legs' numbers but for cosines and sines, is left out.
+all points of an individual, its legs' numbers except cosines and sines, is left out.
 """
 
 from time import process_time
@@ -25,7 +25,7 @@ _compiled = numba.njit(error_model="numpy")
 
 @_compiled
 def _multiply_adds(count, x, y):
-    """So many multiply-adds, few enough of one number in a row that none waits for the one before."""
+    """Multiply-adds, few enough on one number in a row that none waits for the one before."""
     for _ in range(count // (x.size * _DEEP)):
         for j in range(x.size):
             number = x[j]
@@ -37,7 +37,7 @@ def _multiply_adds(count, x, y):
 
 @_compiled
 def _roots(count, x, y):
-    """So many square roots."""
+    """Square roots."""
     for k in range(count // x.size):
         x[k % x.size] += 1.0
         for j in range(x.size):
@@ -46,7 +46,7 @@ def _roots(count, x, y):
 
 @_compiled
 def _divisions(count, x, y):
-    """So many divisions."""
+    """Divisions."""
     for k in range(count // x.size):
         x[k % x.size] += 1.0
         for j in range(x.size):
@@ -55,7 +55,7 @@ def _divisions(count, x, y):
 
 @_compiled
 def _turns(count, x, y):
-    """So many cosines and as many sines."""
+    """Cosines and as many sines."""
     for k in range(count // x.size):
         x[k % x.size] += 1.0
         for j in range(x.size):
@@ -63,7 +63,7 @@ def _turns(count, x, y):
 
 
 def limit_call(points, poses=200_000):
-    """A Call of all that so many poses need, where `points` share an individual, and nothing else."""
+    """A Call of only the arithmetic of poses, where `points` share an individual."""
     x, y = np.linspace(0.5, 1.5, _NUMBERS), np.empty(_NUMBERS)
 
     def work():

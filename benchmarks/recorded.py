@@ -1,6 +1,6 @@
-"""Arms of `data/models/arm6.xml` that MuJoCo drives, and every control that was sent to them, for `benchmarks.sysid`.
+"""Arms of `data/models/arm6.xml` simulated by MuJoCo, with every control recorded, for `benchmarks.sysid`.
 
-The zeros of all drives are off, and either one drive's servo is soft or one gear has play.
+All drives have zero offsets, and either one drive's servo is soft or one gear has backlash.
 """
 
 from dataclasses import dataclass, field, replace
@@ -17,10 +17,10 @@ ROOT = Path(__file__).resolve().parents[1]
 FILE, PLATFORM, NOISE_MM = ROOT / "data/models/arm6.xml", "tool0", 0.01
 NOMINAL = {"name": "arm6", "dimensions": {"mjcf": str(FILE), "platform": PLATFORM}, "parameter_set": "zero"}
 AXES = [f"axis{k}" for k in range(1, 7)]
-# of a drive's numbers: mrad, nrad/(N mm), mrad
+# units of a drive's parameters: mrad, nrad/(N mm), mrad
 UNIT = {"zero": 1e-3, "soft_servo": 1e-9, "play": 1e-3}
 PASSES = ({}, {"reverse": True}, {"trajectories": ["line_1", "spiral"], "payload_kg": 4.0})
-# so slow that inertia is nothing to the diagnosis, which reads the plan's times
+# slow enough that inertia is negligible for the diagnosis, which uses the plan's times
 _MOTION = {"speed_mm_s": 300.0, "acceleration_mm_s2": 10.0, "dwell_s": 60.0}
 # rest before each sequence
 _BEFORE_S = 0.1
@@ -28,7 +28,7 @@ _BEFORE_S = 0.1
 
 @dataclass(frozen=True)
 class Truth:
-    """A robot: zeros (6,) in mrad, its cause, the drive that has it, and its size in that cause's unit."""
+    """A robot: zeros (6,) in mrad, its cause, its drive, and its size in that cause's unit."""
 
     zeros: np.ndarray
     cause: str
@@ -37,16 +37,16 @@ class Truth:
 
     @property
     def causes(self):
-        """As the plant takes them."""
+        """The causes as the plant's input."""
         if self.cause == "play":
-            own = {"play": {self.drive: UNIT["play"] * self.size}}
+            acting = {"play": {self.drive: UNIT["play"] * self.size}}
         else:
-            own = {"actuator_stiffness": {self.drive: 1.0 / (UNIT["soft_servo"] * self.size)}}
-        return {"zero_offset": dict(zip(AXES, UNIT["zero"] * self.zeros, strict=True))} | own
+            acting = {"actuator_stiffness": {self.drive: 1.0 / (UNIT["soft_servo"] * self.size)}}
+        return {"zero_offset": dict(zip(AXES, UNIT["zero"] * self.zeros, strict=True))} | acting
 
 
 def draw(seed):
-    """The Truth of a seed; even ones are soft in a drive that carries weight, odd ones have play in a large joint."""
+    """The Truth of a seed; even ones have a soft drive that carries weight, odd ones backlash in a large joint."""
     generator = np.random.default_rng(seed)
     zeros, even = 2.0 * generator.standard_normal(6), seed % 2 == 0
     drive = str(generator.choice(AXES[1:3] if even else AXES[:3]))
@@ -57,9 +57,9 @@ def draw(seed):
 
 @dataclass
 class Recorded:
-    """Controls (6,) of every step under one payload since the robot stood still, and steps at which points were read.
+    """Controls (6,) of every step with one payload from rest on, and the steps of the readings.
 
-    start: values of qpos by joint where it stood.
+    start: values of qpos by joint at rest.
     """
 
     payload_kg: float
@@ -75,17 +75,17 @@ class Recorded:
 
 
 class Recorder(Machine):
-    """Notes what its controller sends in every step, from the first point on, and when points are read."""
+    """Records the controls of every step, from the first point on, and the times of readings."""
 
     sequences = ()
 
     def _recorded(self):
-        """A new Recorded of the robot as it stands."""
+        """A new Recorded of the robot in its current state."""
         start = {name: self.data.joint(name).qpos.copy() for name in self.edit.home}
         return Recorded(self.payload_kg, self.data.time, start)
 
     def _now(self):
-        """What the controller has sent, which does not know of zeros that are off."""
+        """The current controls without the zero offsets, which the controller does not know."""
         return self.data.ctrl[self.actuators] - [self.edit.offsets.get(joint, 0.0) for joint in self.edit.servos]
 
     def _weigh(self, payload_kg):
@@ -97,9 +97,9 @@ class Recorder(Machine):
     def _closed(self, where):
         super()._closed(where)
         self.sequences = self.sequences or [self._recorded()]
-        own = self.sequences[-1]
-        own.rest(self.data.time, self._now())
-        own.read.append(len(own.controls) - 2)
+        sequence = self.sequences[-1]
+        sequence.rest(self.data.time, self._now())
+        sequence.read.append(len(sequence.controls) - 2)
 
     def _send(self, controls):
         for row in controls:
@@ -112,37 +112,37 @@ class Recorder(Machine):
 
 @dataclass(frozen=True)
 class RecordedRobot(MujocoRobot):
-    """A MujocoRobot that keeps its Recorder."""
+    """A MujocoRobot that stores its Recorder."""
 
-    kept: list = field(default_factory=list)
+    recorders: list = field(default_factory=list)
 
     def machine(self, payload_kg=0.0):
-        """As of a MujocoRobot."""
+        """The Recorder as the machine of a MujocoRobot."""
         made = super().machine(payload_kg)
-        self.kept[:] = [Recorder(made.edit, made.file)]
-        return self.kept[0]
+        self.recorders[:] = [Recorder(made.edit, made.file)]
+        return self.recorders[0]
 
 
 def campaign(truth, seed, trajectories, passes, name):
-    """Measurements of a Truth's robot, and what its controller sent."""
+    """Measurements of a Truth's robot, and the recorded controls."""
     virtual = {
         "name": name,
         "seed": seed,
         "robot": {"mujoco": {"causes": truth.causes}},
         "trajectories": trajectories,
-        "passes": [{"reverse": False, "payload_kg": 0.0} | one for one in passes],
+        "passes": [{"reverse": False, "payload_kg": 0.0} | campaign_pass for campaign_pass in passes],
         "motion": _MOTION,
         "noise_mm": NOISE_MM,
     }
     driven = setup.virtual_campaign(NOMINAL, virtual)
-    own = driven.robot
-    robot = RecordedRobot(own.mechanism, own.file, own.platform, own.causes)
+    plant = driven.robot
+    robot = RecordedRobot(plant.mechanism, plant.file, plant.platform, plant.causes)
     frame, _ = replace(driven, robot=robot).run()
-    return frame, robot.kept[0].sequences
+    return frame, robot.recorders[0].sequences
 
 
 def trajectories(x_mm, z_mm):
-    """Two lines and a turn of a spiral about a place: short, as every fit drives them a hundred times."""
+    """Two lines and a turn of a spiral about a place: short, because every fit simulates them a hundred times."""
     lines = {"start_mm": [x_mm - 90.0, 0.0, z_mm - 40.0], "end_mm": [x_mm + 90.0, 0.0, z_mm + 40.0]}
     spiral = {"centre_mm": [x_mm, 0.0], "radius_mm": [50.0, 90.0], "z_mm": [z_mm - 50.0, z_mm + 50.0]}
     return {

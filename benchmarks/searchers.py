@@ -1,4 +1,4 @@
-"""Other programs' searches for a minimum within the unit box, each as its manual shows it.
+"""Other programs' searches for a minimum within the unit box, each as in its manual.
 
 A search is called with a function of individuals (m, p) in 0..1 to values (m,), the number of genes and a seed; it goes
 on until that function ends it.
@@ -44,7 +44,7 @@ def _scattered(parents, size, ga):
 
 
 def _shrinking(children, ga):
-    """The last children moved by normal steps that shrink to nothing over the generations."""
+    """The last children moved by normal steps that shrink to zero over the generations."""
     size = 1.0 - ga.generations_completed / GENERATIONS
     for k in range(_CROSSED, len(children)):
         children[k] = np.clip(children[k] + size * ga.draw.standard_normal(children.shape[1]), 0.0, 1.0)
@@ -52,7 +52,7 @@ def _shrinking(children, ga):
 
 
 def pygad_own(rate, genes, seed):
-    """PyGAD with the paper's operators as functions of one's own, and one call per individual."""
+    """PyGAD with the paper's operators as custom functions, and one call per individual."""
     ga = pygad.GA(
         num_generations=GENERATIONS,
         num_parents_mating=POPULATION,
@@ -108,7 +108,7 @@ def scipy_de(rate, genes, seed):
 
 
 def pycma(rate, genes, seed):
-    """CMA-ES, asked and told a generation at once."""
+    """CMA-ES, one generation per ask-and-tell call."""
     options = {"bounds": [0.0, 1.0], "seed": seed + 1, "verbose": -9}
     search = cma.CMAEvolutionStrategy(np.full(genes, 0.5), 0.3, options)
     while not search.stop():

@@ -1,4 +1,4 @@
-"""Where calibrations end that know neither the instrument's frame nor the targets: random robots beside SciPy.
+"""Minima of calibrations with unknown instrument frame and targets: random robots, compared with SciPy.
 
 Arms of six and seven axes, columns that lift an arm, gantries and hexapods, with errors of all their numbers; the
 instrument up to 2 m and any turn off, up to three targets up to 0.3 m from the tool, 60 to 140 poses. SciPy starts at
@@ -24,7 +24,7 @@ _SEARCHES = {
 
 
 def rows_of(kind, count):
-    """Rows of one kind of robot: a search each."""
+    """Rows of one kind of robot, one per search."""
     found = [outcome_of(kind, seed) for seed in range(count)]
     for name, what in _SEARCHES.items():
         task = Task("solver", f"{kind} of unknown frame and targets, {what}", count)
@@ -47,4 +47,4 @@ def rows():
 
 
 if __name__ == "__main__":
-    harness.keep("solver", rows())
+    harness.store("solver", rows())

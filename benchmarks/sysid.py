@@ -1,12 +1,12 @@
-"""MuJoCo's own system identification, `mujoco.sysid`, beside the diagnosis: intervals, gap left on fresh runs, seconds.
+"""MuJoCo's system identification, `mujoco.sysid`, compared with the diagnosis: intervals, held-out gap, seconds.
 
-Six-axis arms of `data/models/arm6.xml`, driven by MuJoCo: the zeros of all drives are off, and either one drive's servo
-is soft or one gear has play. Both see one campaign, the same points with the same noise. `mujoco.sysid` is used as its
-documentation says, and helped where it can be: it is given every control that was sent, step by step, and a structure
-of which only numbers are unknown, the zeros of all drives and either the compliance of all or the play of the one that
-has it (with the joint and the friction that the plant has). Residuals are in mm, so that all axes weigh alike. Payloads
-make sequences of their own, as it advises. It is also given the other cause's structure, to see what it says then. The
-diagnosis is told the file and nothing of causes; what it finds is tried by its corrected file.
+Six-axis arms of `data/models/arm6.xml`, simulated by MuJoCo: all drives have zero offsets, and either one drive's servo
+is soft or one gear has backlash. Both methods use the same campaign with the same noise. `mujoco.sysid` is used as in
+its documentation, with as much prior knowledge as possible. It has every control, step by step, and a structure with
+unknown parameters only: the zeros of all drives, and either the compliance of all or the backlash of the one that has
+it (with the joint and the friction of the plant). Residuals are in mm, so that all axes have equal weight. Each payload
+is a separate sequence, as its documentation advises. It is also run with the structure of the other cause. The
+diagnosis has the file and no information on causes; its result is evaluated by its corrected file.
 
 `make bench GROUPS=sysid` writes results/tables/sysid.parquet.
 """
@@ -38,7 +38,7 @@ from benchmarks.recorded import (
     draw,
     trajectories,
 )
-from benchmarks.sysid_table import TABLE, beside
+from benchmarks.sysid_table import TABLE, timing_rows
 from rrru.campaign import measurements as rows
 from rrru.diagnosis.correction.corrected_model import write_corrected
 from rrru.diagnosis.diagnose import MeasuredRobot, diagnose
@@ -52,18 +52,18 @@ from rrru.studies.end_to_end.models import errors
 # seeds from 0 on; the first few are also fitted in the other structure
 ROBOTS, WRONG, OUT = 6, 2, ROOT / "results/tables/sysid.parquet"
 _MASSES = Masses(0.0, 0.0, 0.0)
-# in the numbers' units: steps of the finite differences, and changes that end a fit; its default of 1e-8 is below the
-# noise of a simulation in which friction creeps
-_HOW = {"eps": 1e-3, "xtol": 1e-4, "gtol": 1e-4, "max_iters": 10, "x_scale": "jac"}
+# in the parameters' units: steps of the finite differences, and tolerances of a fit; the default of 1e-8 is below the
+# noise of a simulation with creeping friction
+_OPTIONS = {"eps": 1e-3, "xtol": 1e-4, "gtol": 1e-4, "max_iters": 10, "x_scale": "jac"}
 _SIGMAS = 1.96
 _START = {"zero": 0.0, "soft_servo": 0.1, "play": 0.2}
 _BOUNDS = {"zero": (-20.0, 20.0), "soft_servo": (0.005, 50.0), "play": (0.0, 5.0)}
 
 
 def structure(given, drive):
-    """The Edit of the file as both plants drive it, with the play of a drive where that is what is unknown."""
+    """The Edit of the file as in both plants, with the backlash of a drive where that is unknown."""
     edit = mujoco_model.read(FILE, PLATFORM, (0.0, 0.0, 0.0), AXES)
-    edit.payload_kg = max(one.get("payload_kg", 0.0) for one in PASSES)
+    edit.payload_kg = max(run.get("payload_kg", 0.0) for run in PASSES)
     if given == "play":
         mujoco_causes.apply(edit, {"play": {drive: UNIT["play"] * _START["play"]}})
     edit.spec.add_sensor(
@@ -73,7 +73,7 @@ def structure(given, drive):
 
 
 def unknown(given, drive):
-    """The ParameterDict of a structure: zeros of all drives, and compliances of all or the play of one."""
+    """The ParameterDict of a structure: zeros of all drives, and compliances of all or the backlash of one."""
     names = [("zero", axis) for axis in AXES]
     names += [(given, axis) for axis in (AXES if given == "soft_servo" else [drive])]
     result = sysid.ParameterDict()
@@ -83,7 +83,7 @@ def unknown(given, drive):
 
 
 def build_model(params, spec):
-    """The model of a structure with its numbers: stiffness as one over the compliance, damped as well as the file's."""
+    """The model of a structure with its parameters: stiffness as inverse compliance, damping ratio as in the file."""
     spec = spec.copy()
     for servo in spec.actuators:
         if (name := f"soft_servo {servo.target}") in params:
@@ -98,7 +98,7 @@ def build_model(params, spec):
 
 
 def in_mm(params, sensordata_predicted, sensordata_measured, model, return_pred_all, **kwargs):
-    """Residuals in mm at the times at which points were read."""
+    """Residuals in mm at the times of the readings."""
     del params, model, return_pred_all, kwargs
     measured = sensordata_measured
     predicted = sysid.TimeSeries(
@@ -108,7 +108,7 @@ def in_mm(params, sensordata_predicted, sensordata_measured, model, return_pred_
 
 
 def residual_of(edit, frame, sequences):
-    """The residual function of a measurement table and what was sent, one ModelSequences for every payload."""
+    """The residual function of a measurement table and the controls, one ModelSequences for every payload."""
     models, first = [], 0
     for number, one in enumerate(sequences):
         spec, controls = edit.spec.copy(), np.array(one.controls)
@@ -121,38 +121,38 @@ def residual_of(edit, frame, sequences):
         times, read = mujoco_model.STEP_S * np.arange(len(controls)), np.array(one.read)
         places = 1e-3 * rows.measured(frame)[first : first + len(read)]
         first += len(read)
-        told = (
+        inputs = (
             sysid.create_initial_state(model, start.copy()),
             sysid.TimeSeries.from_control_names(times, controls, model),
             sysid.TimeSeries.from_names(times[read], places, model),
         )
-        models.append(sysid.ModelSequences(f"{one.payload_kg:g} kg", spec, f"sequence {number}", *told))
+        models.append(sysid.ModelSequences(f"{one.payload_kg:g} kg", spec, f"sequence {number}", *inputs))
     return sysid.build_residual_fn(models_sequences=models, build_model=build_model, modify_residual=in_mm, n_threads=1)
 
 
 def by_sysid(truth, given, measured, fresh):
-    """What `mujoco.sysid` says, and its model's errors (n, 3) on a fresh campaign. measured, fresh: of `campaign`."""
-    told, before = io.StringIO(), process_time()
-    handler = logging.StreamHandler(told)
+    """The result of `mujoco.sysid`, and its model's errors (n, 3) on a new campaign. measured, fresh: of `campaign`."""
+    messages, before = io.StringIO(), process_time()
+    handler = logging.StreamHandler(messages)
     handler.setLevel(logging.WARNING)
     logging.getLogger("absl").addHandler(handler)
     edit, params = structure(given, truth.drive), unknown(given, truth.drive)
     residual = residual_of(edit, *measured)
     with contextlib.redirect_stdout(io.StringIO()):
-        found, result = sysid.optimize(params, residual, **_HOW)
+        found, result = sysid.optimize(params, residual, **_OPTIONS)
     left, _, _ = residual(result.x, found)
     _, widths = sysid.calculate_intervals(left, result.jac)
     seconds = process_time() - before
     logging.getLogger("absl").removeHandler(handler)
     after, _, _ = residual_of(edit, *fresh)(result.x, found)
     numbers = dict(zip(found.get_non_frozen_parameter_names(), zip(result.x, widths, strict=True), strict=True))
-    after = np.concatenate([one.reshape(-1, 3) for one in after])
-    own = {"by": "mujoco.sysid", "given": given, "answer": told.getvalue().strip(), "seconds": seconds}
-    return own | {"left_mm": rms(np.concatenate(left))} | counted(truth, numbers), after
+    after = np.concatenate([part.reshape(-1, 3) for part in after])
+    row = {"by": "mujoco.sysid", "given": given, "answer": messages.getvalue().strip(), "seconds": seconds}
+    return row | {"left_mm": rms(np.concatenate(left))} | counted(truth, numbers), after
 
 
 def by_us(truth, measured, fresh):
-    """What the diagnosis says, and errors (n, 3) of its corrected file on a fresh campaign, NaN where it has none."""
+    """The result of the diagnosis, and errors (n, 3) of its corrected file on a new campaign, NaN without one."""
     frame, before = measured[0], process_time()
     config = yaml.safe_load((ROOT / "config.yaml").read_text())
     known = MeasuredRobot(setup.measured_robot(NOMINAL, frame), _MASSES, NOISE_MM, "arm6")
@@ -169,23 +169,23 @@ def by_us(truth, measured, fresh):
         write_corrected(result, NOMINAL["dimensions"], _MASSES, file)
         nominal = known.mechanism, np.zeros(len(known.mechanism.parameters))
         points = errors(fresh[0], NOMINAL, _MASSES, nominal, file)
-    own = fresh[0][["run", "point"]].merge(points[points["model"] == "corrected"], how="left", on=["run", "point"])
+    points = fresh[0][["run", "point"]].merge(points[points["model"] == "corrected"], how="left", on=["run", "point"])
     verdict = result.verdict
     answer = f"{verdict['effects']} {verdict['probability']:.2f}"
     if verdict["confusable_with"]:
         answer += f" or {verdict['confusable_with']}"
     shrink = result.tables["gap_shrink"].query("trajectory == '*'").iloc[-1]
-    told = {"by": "rrru", "given": "nothing", "answer": answer, "seconds": seconds, "left_mm": shrink["rms_mm"]}
-    return told | counted(truth, numbers), rows.vectors(own, "error")
+    row = {"by": "rrru", "given": "nothing", "answer": answer, "seconds": seconds, "left_mm": shrink["rms_mm"]}
+    return row | counted(truth, numbers), rows.vectors(points, "error")
 
 
 def counted(truth, numbers):
-    """How many (value, half width of the 95 % interval) by `kind axis` hold what is true."""
+    """Coverage of the true numbers by estimates (value, half width of the 95 % interval) by `kind axis`."""
     true = {f"zero {axis}": size for axis, size in zip(AXES, truth.zeros, strict=True)}
     true[f"{truth.cause} {truth.drive}"] = truth.size
     known = {name: pair for name, pair in numbers.items() if name in true and 0.0 < pair[1] < np.inf}
     held = {name: abs(value - true[name]) <= width for name, (value, width) in known.items()}
-    zeros = [one for name, one in held.items() if name.startswith("zero")]
+    zeros = [inside for name, inside in held.items() if name.startswith("zero")]
     cause = f"{truth.cause} {truth.drive}"
     off = (known[cause][0] - truth.size) / known[cause][1] * _SIGMAS if cause in known else np.nan
     counts = {"numbers": int(cause in held), "held": int(held.get(cause, False)), "off_sigmas": off}
@@ -204,15 +204,15 @@ def rows_of(seed):
     fresh = campaign(truth, seed, trajectories(520.0, 900.0), [{"payload_kg": 2.0}, {"reverse": True}], "fresh")
     other = "play" if truth.cause == "soft_servo" else "soft_servo"
     structures = [truth.cause, other] if seed < WRONG else [truth.cause]
-    found = [by_us(truth, measured, fresh)] + [by_sysid(truth, one, measured, fresh) for one in structures]
-    # points that all models say something of
+    found = [by_us(truth, measured, fresh)] + [by_sysid(truth, given, measured, fresh) for given in structures]
+    # points with a prediction by all models
     used = np.isfinite([after for _, after in found]).all(axis=(0, 2))
     shared = {"robot": seed, "cause": truth.cause, "points": len(measured[0]), "noise_mm": np.sqrt(3.0) * NOISE_MM}
     return [shared | row | {"fresh_mm": rms(after[used])} for row, after in found]
 
 
 def main():
-    """Write the table and print it; the seconds are rows of `benchmarks`, too."""
+    """Write the table and print it; the seconds are also rows of `benchmarks`."""
     result = []
     for seed in range(ROBOTS):
         result += rows_of(seed)
@@ -220,7 +220,7 @@ def main():
         OUT.parent.mkdir(parents=True, exist_ok=True)
         tables.write(TABLE, frame, OUT)
         print(frame[frame["robot"] == seed].T.to_string(), flush=True)
-    harness.keep("sysid", beside(frame))
+    harness.store("sysid", timing_rows(frame))
 
 
 if __name__ == "__main__":

@@ -20,7 +20,7 @@ _SHARED, _PLACE = 4, 3
 
 
 def held_out_of_targets(generator, noise_mm=0.02, poses=120):
-    """A HeldOut of two targets read one after the other over the same poses, and the columns (n, 3, p)."""
+    """A HeldOut of two targets measured in sequence over the same poses, and the columns (n, 3, p)."""
     count, generic = 2 * poses, generator.standard_normal((poses, 3, _SHARED))
     columns = np.zeros((count, 3, _SHARED + 2 * _PLACE))
     for target in range(2):
@@ -37,7 +37,7 @@ def held_out_of_targets(generator, noise_mm=0.02, poses=120):
 
 
 def predicted_and_exact_mm(generator, noise_mm=0.02, poses=120):
-    """Rms error of predictions without noise: as stated of held-out readings, and of a fit to all readings."""
+    """Rms error of predictions without noise: as predicted for held-out readings, and of a fit to all readings."""
     held_out, columns = held_out_of_targets(generator, noise_mm, poses)
     stated = held_out.predict((), [], 0).uncertainty_mm2.mean()
     flat = columns.reshape(-1, columns.shape[-1])
@@ -48,4 +48,4 @@ def predicted_and_exact_mm(generator, noise_mm=0.02, poses=120):
 
 if __name__ == "__main__":
     predicted, fitted = predicted_and_exact_mm(np.random.default_rng(0))
-    print(f"stated of held-out readings {predicted:.4g} mm, of a fit to all readings {fitted:.4g} mm")
+    print(f"predicted for held-out readings {predicted:.4g} mm, of a fit to all readings {fitted:.4g} mm")

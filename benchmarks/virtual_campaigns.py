@@ -1,10 +1,10 @@
-"""Virtual campaigns whose truth lies in the model's own family: readings = exact model at drawn parameters + noise.
+"""Virtual campaigns with a truth in the model's own family: readings = exact model at drawn parameters + noise.
 
-Whatever a diagnosis gets wrong on them, it gets wrong by its estimation, and not because a model is incomplete. The one
-exception is the scene "discrepancy". Three robots: the 3-RRRU, a hexapod (6-UPS) and an arm of seven axes. Scenes: see
+Errors of a diagnosis on them come from its estimation, not from an incomplete model. The only exception is the scene
+"discrepancy". Three robots: the 3-RRRU, a hexapod (6-UPS) and an arm of seven axes. Scenes: see
 `SCENES`. The same seed gives the same readings. Lengths mm, angles rad.
 
-The parameters are drawn anew for every draw: a credible interval of 95 % under a proper prior holds 95 % of the truths
+The parameters are new for every draw: a credible interval of 95 % under a proper prior holds 95 % of the truths
 that are drawn from this prior (Cook, Gelman and Rubin, Validation of software for Bayesian models using posterior
 quantiles, J. Comput. Graph. Stat. 15, 2006).
 """
@@ -35,15 +35,15 @@ from rrru.seeds import stream
 NOISE_MM = 0.02
 # standard deviations of the true errors of geometric parameters, by unit
 ERROR_SD = {"mm": 0.3, "rad": 5e-4}
-# true coefficients of an effect: its typical size times a factor between these, so far apart that legs are not alike
+# true coefficients of an effect: its typical size times a factor between these, so that legs clearly differ
 EFFECT_FACTORS = (0.3, 2.5)
-# prior of payload and tilt as docs state it: with even odds narrow or wide, in standard deviations of the wide one
+# prior of payload and tilt as in the docs: narrow or wide with equal odds, in standard deviations of the wide one
 PAYLOAD_SHARE, TILT_SD_RAD, NARROW, NARROW_ODDS = 0.3, float(np.radians(1.0)), 0.1, 0.5
 # rms of a discrepancy after the calibration over that of the noise
 DISCREPANCY_OVER_NOISE = 3.0
-# a combination of parameters is identifiable where white noise alone makes an error of less than this
+# largest error by white noise alone of an identifiable combination of parameters
 IDENTIFIABLE_MM = 1.0
-# loads and the poses under them agree after so many rounds
+# fixed-point iterations of loads and poses
 _ROUNDS_OF_LOADS = 3
 _STEP = {"mm": 1e-2, "rad": 1e-5}
 
@@ -65,7 +65,7 @@ class Noise:
         return float(np.sqrt(np.mean(np.square(self.axis_mm))))
 
     def covariances(self, count):
-        """Covariances (3, count, count) of the errors of each axis along a run of so many readings."""
+        """Covariances (3, count, count) of the errors of each axis along a run of count readings."""
         wave = np.arange(count)
         cosines = idct(np.eye(count), axis=0, norm="ortho")
         both = self.smooth_mm**2 * (cosines * _smooth_density(count)) @ cosines.T + self.run_mm**2
@@ -93,7 +93,7 @@ def autoregressive(white, correlation):
 
 
 def smooth_function(count, generator):
-    """A smooth function (count, 3) of unit mean variance: half its spectral density is lost at the third half-wave."""
+    """A smooth function (count, 3) of unit mean variance, with half of its spectral density at the third half-wave."""
     waves = np.sqrt(_smooth_density(count))[:, None] * generator.standard_normal((count, 3))
     return idct(waves, axis=0, norm="ortho")
 
@@ -106,9 +106,11 @@ def _smooth_density(count):
 
 @dataclass(frozen=True)
 class Scene:
-    """noise; paths: whether poses follow one another along paths in several runs; two_targets: two of them, one run
-    each over the same poses; removed: whether a law acts that the diagnosis is not offered; open: whether there are
-    parameters that the poses do not identify; payload: whether payload and tilt are unknown.
+    """A scene of virtual campaigns.
+
+    paths: poses along paths in several runs; two_targets: one run each over the same poses; removed: an effect outside
+    the diagnosis' library acts; open: some parameters are not identifiable from the poses; payload: payload and tilt
+    are unknown.
     """
 
     noise: Noise = field(default_factory=Noise)
@@ -128,16 +130,17 @@ SCENES = {
     "discrepancy": Scene(removed=True, paths=True),
     "open": Scene(open=True),
     "payload": Scene(payload=True),
-    # a control of "discrepancy": the function that the model itself assumes, independent from run to run
+    # a control of "discrepancy": the function of the model's own prior, independent from run to run
     "smooth": Scene(Noise(smooth_mm=2.0 * NOISE_MM), paths=True),
 }
 
 
 @dataclass(frozen=True)
 class Library:
-    """acting: the effect that acts where one does; offered: names that the diagnosis is offered; removed: a law that
-    is not among them; strong: factor by which the effect exceeds its typical size, so that the readings decide whether
-    it is alike on all legs.
+    """Effects of a robot's campaigns.
+
+    acting: the acting effect; offered: names in the library of the diagnosis; removed: an effect outside it; strong:
+    factor of the effect over its typical size, so that the readings decide whether it is equal on all legs.
     """
 
     acting: str
@@ -176,7 +179,7 @@ _SHIFT_MM, _TURN_RAD = 70.0, float(np.radians(10.0))
 
 @cache
 def nominal_robot(robot):
-    """The nominal robot (one of ROBOTS) with all parameters that positions identify over its workspace."""
+    """The nominal robot (one of ROBOTS) with all parameters that are identifiable from positions over its workspace."""
     if robot == "rrru3":
         return Rrru3()
     options = {"tool_mm": _TOOLS_MM[robot], "parameter_set": "full"}
@@ -193,11 +196,11 @@ def _ring(radius_mm, angles_deg):
 
 @dataclass(frozen=True, eq=False)
 class VirtualCampaign:
-    """A campaign before anything is measured.
+    """A campaign before any measurement.
 
-    mechanism: with the parameters that are fitted; commands: table of n readings without measured columns; fresh: that
-    of other runs, along the same paths or at other poses of the same range; library: what acts and what is
-    offered to the diagnosis.
+    mechanism: with the fitted parameters; commands: table of n readings without measured columns; fresh: that of other
+    runs, along the same paths or at other poses of the same range; library: acting effects and those of the
+    diagnosis.
     """
 
     robot: str
@@ -210,9 +213,9 @@ class VirtualCampaign:
 
     @cached_property
     def cases(self):
-        """What `make_case` makes of commands and fresh runs, read without error."""
+        """The Cases of commands and fresh runs, measured without error."""
         tables = self.commands, self.fresh
-        return tuple(make_case(_read_as_commanded(one), self.mechanism, self.masses, 1.0, {}) for one in tables)
+        return tuple(make_case(_read_as_commanded(table), self.mechanism, self.masses, 1.0, {}) for table in tables)
 
     @cached_property
     def jacobian(self):
@@ -232,13 +235,13 @@ class VirtualCampaign:
 
     @cached_property
     def still(self):
-        """Numbers from 1 on of the drives that stand still: the calibration explains an effect of such a drive."""
+        """Numbers from 1 on of the drives that do not move: the calibration absorbs an effect of such a drive."""
         drive = rows.actuators(self.commands, self.mechanism)
         return frozenset((1 + np.flatnonzero(np.ptp(drive, axis=0) == 0.0)).tolist())
 
     @cached_property
     def identifiable(self):
-        """Orthonormal combinations (p, r), in units of `scale`, that the readings identify: see IDENTIFIABLE_MM."""
+        """Orthonormal identifiable combinations (p, r), in units of `scale`: see IDENTIFIABLE_MM."""
         flat = self.jacobian.reshape(-1, len(self.scale)) * self.scale
         _, size, turned = np.linalg.svd(flat, full_matrices=False)
         return turned[IDENTIFIABLE_MM * size > NOISE_MM].T
@@ -247,19 +250,19 @@ class VirtualCampaign:
 @cache
 def virtual_campaign(robot, scene, size=1.0):
     """The VirtualCampaign of a robot (one of ROBOTS) and a scene (name); size: share of the usual number of poses."""
-    one, library = SCENES[scene], _LIBRARIES[robot]
-    if one.payload:
+    chosen, library = SCENES[scene], _LIBRARIES[robot]
+    if chosen.payload:
         library = _UNDER_PAYLOAD
-    commands, fresh = (_commands(robot, one, size, seed) for seed in (1, 1 if one.paths else 2))
-    mechanism = _with_parameters(robot, one, commands)
-    library = library if one.removed else replace(library, removed="")
-    return VirtualCampaign(robot, one, mechanism, _MASSES[robot], commands, fresh, library)
+    commands, fresh = (_commands(robot, chosen, size, seed) for seed in (1, 1 if chosen.paths else 2))
+    mechanism = _with_parameters(robot, chosen, commands)
+    library = library if chosen.removed else replace(library, removed="")
+    return VirtualCampaign(robot, chosen, mechanism, _MASSES[robot], commands, fresh, library)
 
 
 def pose_campaign(robot, count, noise_mm, acting, repeats, generator):
-    """The VirtualCampaign of so many random poses of a robot, with white noise; acting: the effect of its library.
+    """The VirtualCampaign of count random poses of a robot, with white noise; acting: the effect of its library.
 
-    repeats: how many of the poses are read again after all others, and how often each is read in all.
+    repeats: number of poses that are measured again after all others, and number of readings of each.
     """
     nominal, (again, times) = nominal_robot(robot), repeats
     drive, position = _poses(robot, count, False, generator)
@@ -272,10 +275,10 @@ def pose_campaign(robot, count, noise_mm, acting, repeats, generator):
 
 
 def _with_parameters(robot, scene, commands):
-    """The robot with the parameters that the commands identify; where the scene is open with others besides."""
+    """The robot with the parameters identifiable from the commands; in an open scene also with others."""
     nominal, reads = nominal_robot(robot), rows.reads(commands)
     if scene.open and robot == "rrru3":
-        # places of a target and of the frame: a platform that never turns has no use for both
+        # with a platform that never rotates, the places of a target and of the frame are not separately identifiable
         reads = MeasurementConfig(("reflector a",), ("reflector a",), frame=True)
     if reads.reflectors:
         nominal = nominal.reading(reads)
@@ -286,7 +289,7 @@ def _with_parameters(robot, scene, commands):
 
 
 def _read_as_commanded(frame):
-    """A table of commands as if every reading were the commanded position."""
+    """A table of commands with the commanded positions as readings."""
     return frame.assign(**rows.vector_columns("measured", rows.command(frame)))
 
 
@@ -307,7 +310,7 @@ def _commands(robot, scene, size, seed):
 
 
 def _rrru3_commands(scene, size):
-    """Three lines and a spiral, to and fro, and once more with a payload: 12 runs of 222 points."""
+    """Three lines and a spiral, forward and reverse, and again with a payload: 12 runs of 222 points."""
     count, nominal = max(int(16 * size), 6), nominal_robot("rrru3")
     lines = [Line(f"line_{k}", (-600.0, y, 650.0), (0.0, y, 650.0), count) for k, y in enumerate((0.0, 110.0, -110.0))]
     spiral = Spiral("spiral", (0.0, 0.0), (50.0, 280.0), (560.0, 760.0), 4.5, max(int(26 * size), 10))
@@ -319,7 +322,7 @@ def _rrru3_commands(scene, size):
 
 
 def _pose_commands(robot, scene, size, generator):
-    """240 poses of a robot whose tool turns: in no order, or along ten ways between two poses, each to and fro."""
+    """240 poses of a robot whose tool rotates: in random order, or along ten paths, each both ways."""
     nominal, count = nominal_robot(robot), max(int(240 * size), 80) // (1 + scene.two_targets)
     if scene.paths:
         drive, run, trajectory = _along_ways(robot, count, generator)
@@ -359,9 +362,9 @@ def _along_ways(robot, count, generator, ways=10):
 
 
 def _poses(robot, count, constrained, generator):
-    """Drive values (count, K) and positions (count, 3) of the tool in no order.
+    """Drive values (count, K) and positions (count, 3) of the tool in random order.
 
-    constrained: an arm's last two axes stand still, a hexapod's platform turns about z alone.
+    constrained: an arm's last two axes do not move, a hexapod's platform rotates about z alone.
     """
     nominal = nominal_robot(robot)
     if robot == "arm7":
@@ -377,12 +380,12 @@ def _poses(robot, count, constrained, generator):
 
 
 def _with_targets(frame, places_mm):
-    """The commands with targets by name, read one after the other over the same poses, each in runs of its own."""
+    """The commands with targets by name, measured in sequence over the same poses, each in separate runs."""
     parts, last_s = [], 0.0
     for number, (name, place) in enumerate(places_mm.items()):
         columns = dict(zip(("target_x_mm", "target_y_mm", "target_z_mm"), place, strict=True))
-        own = frame.assign(run=frame["run"] + number * frame["run"].max(), target=name, **columns)
-        parts.append(own.assign(time_s=own["time_s"] + last_s))
+        runs = frame.assign(run=frame["run"] + number * frame["run"].max(), target=name, **columns)
+        parts.append(runs.assign(time_s=runs["time_s"] + last_s))
         last_s += frame["time_s"].max() + 60.0
     return pd.concat(parts, ignore_index=True)
 
@@ -392,8 +395,10 @@ def _with_targets(frame, places_mm):
 
 @dataclass(frozen=True)
 class Truth:
-    """deviations (p,) of the geometric parameters; effects: ActiveEffects of the library that is offered; discrepancy:
-    of the law that is not; payload: extra mass and tilt by name.
+    """The truth of a draw.
+
+    deviations (p,) of the geometric parameters; effects: ActiveEffects of the diagnosis' library; discrepancy: of the
+    effect outside it; payload: extra mass and tilt by name.
     """
 
     deviations: np.ndarray
@@ -426,9 +431,9 @@ def _active(effect, coordinates):
 
 def _draw_coordinates(effect, generator):
     """Coordinates (c,) of an effect: its typical size times a factor, of any sign that it allows."""
-    own = effect.coordinates
-    size = generator.uniform(*EFFECT_FACTORS, len(own)) * own.typical
-    return size * np.where(own.positive, 1.0, generator.choice([-1.0, 1.0], len(own)))
+    coordinates = effect.coordinates
+    size = generator.uniform(*EFFECT_FACTORS, len(coordinates)) * coordinates.typical
+    return size * np.where(coordinates.positive, 1.0, generator.choice([-1.0, 1.0], len(coordinates)))
 
 
 def _draw_payload(campaign, generator):
@@ -440,14 +445,14 @@ def _draw_payload(campaign, generator):
     )
     wide = np.array([PAYLOAD_SHARE * stated.max(), TILT_SD_RAD])
     mass_sd, tilt_sd = np.where(generator.random(2) < NARROW_ODDS, NARROW, 1.0) * wide
-    # nothing weighs less than a tenth of what is stated
+    # the mass is at least a tenth of the stated one
     extra = max(mass_sd * generator.standard_normal(), -0.9 * stated.min())
     names = ("extra_kg", *(f"lean_{'xyz'[axis]}" for axis in level_axes(robot)))
     return dict(zip(names, map(float, (extra, *tilt_sd * generator.standard_normal(2))), strict=True))
 
 
 def _draw_discrepancy(campaign, generator):
-    """The removed law at drawn coordinates, of the size that DISCREPANCY_OVER_NOISE says after the calibration."""
+    """The removed effect at random coordinates, scaled to DISCREPANCY_OVER_NOISE after the calibration."""
     effect = find(campaign.library.removed, campaign.mechanism)
     coordinates, nothing = _draw_coordinates(effect, generator), np.zeros(len(campaign.scale))
     change = exact_readings(campaign, Truth(nothing, (_active(effect, coordinates),)))
@@ -459,34 +464,34 @@ def _draw_discrepancy(campaign, generator):
 
 
 def exact_readings(campaign, truth, fresh=False):
-    """Readings (n, 3) without noise under a Truth, of the commands or of the fresh runs.
+    """Noise-free readings (n, 3) of a Truth, for the commands or the fresh runs.
 
     Raises ValueError where the legs do not close.
     """
     case, robot = campaign.cases[fresh], campaign.mechanism
     motion, readings, effects = case.motion, case.readings, truth.effects + truth.discrepancy
-    sent = rows.actuators(case.measurements, robot), rows.command(case.measurements)
+    commanded = rows.actuators(case.measurements, robot), rows.command(case.measurements)
     bearing = robot.orients and any(gives_way(active.effect) for active in effects)
     for _ in range(_ROUNDS_OF_LOADS if bearing else 1):
         twists = robot.twists(truth.deviations) + _twists(effects, motion, truth.payload)
-        poses = robot.solve(*sent, twists)
+        poses = robot.solve(*commanded, twists)
         if bearing:
-            at = standing(robot, sent, (poses, twists), readings is not None)
-            # as the diagnosis has it: the payload changes the loads by what it changes where the nominal robot stands
+            at = standing(robot, commanded, (poses, twists), readings is not None)
+            # as in the diagnosis: changes of the loads by the payload are evaluated at the nominal poses
             motion = replace(case.motion_at(at), load_slopes=lambda: case.motion.slopes)
     if not poses.closed.all():
-        raise ValueError(f"{campaign.robot}: {(~poses.closed).sum()} poses do not close under the drawn errors")
+        raise ValueError(f"{campaign.robot}: {(~poses.closed).sum()} poses do not close with the drawn errors")
     return robot.measured(poses, twists, readings) if readings is not None else robot.measured(poses, twists)
 
 
 def _twists(effects, motion, payload):
-    """Twists (n or 1, sites, 6) of active effects along a motion; those that give way bear the true payload."""
+    """Twists (n or 1, sites, 6) of active effects along a motion; compliances have the loads of the true payload."""
     heavy = motion.under(*payload.values()) if payload else motion
-    return sum((one.contribute(heavy if gives_way(one.effect) else motion).twists for one in effects), 0.0)
+    return sum((active.contribute(heavy if gives_way(active.effect) else motion).twists for active in effects), 0.0)
 
 
 def measure(campaign, truth, generator, fresh=False):
-    """The table of readings under a Truth with noise drawn from a generator."""
+    """The table of readings of a Truth with noise drawn from a generator."""
     frame = campaign.fresh if fresh else campaign.commands
     errors = campaign.scene.noise.draw(rows.series(frame), generator)
     return frame.assign(**rows.vector_columns("measured", exact_readings(campaign, truth, fresh) + errors))

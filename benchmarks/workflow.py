@@ -1,6 +1,6 @@
-"""The workflow: seconds inside of its rules against seconds around them.
+"""The workflow: seconds inside its rules compared with seconds around them.
 
-Four campaigns from their files or plans to their verdicts, on one core, each run in a folder of its own. Inside is from
+Four campaigns from their files or plans to their verdicts, on one core, each run in a separate folder. Inside is from
 a job's start to its end, Python's start and imports included, as Snakemake records it; around is the rest of the run by
 the clock: planning, checks of the configuration, and what Snakemake does between two jobs.
 """
@@ -59,4 +59,4 @@ def rows():
 
 
 if __name__ == "__main__":
-    harness.keep("workflow", rows())
+    harness.store("workflow", rows())

@@ -1,4 +1,4 @@
-"""The run that a diagnosis advises, as runs of a plan: a pass as the campaign's, or short passes of poses. mm, s."""
+"""The run that a diagnosis advises, as runs of a plan: a pass like the campaign's, or short passes of poses. mm, s."""
 
 from rrru.campaign import measurements as rows
 from rrru.campaign.plan import make_plan

@@ -1,4 +1,4 @@
-"""What is told of one campaign before anything is fitted: state, singularities, workspace. Lengths in mm."""
+"""Tables of one campaign before any fit: state, singularities, workspace. Lengths in mm."""
 
 import numpy as np
 import pandas as pd
@@ -24,7 +24,7 @@ def with_singularities(robot, measurements, margin):
 def workspace_table(robot, measurements):
     """Rows of `workspace`: a vertical slice and the horizontal one through the middle of the commands.
 
-    The vertical one is y = 0, or through the same middle where the robot reaches nothing there.
+    The vertical one is y = 0, or through the same middle where the robot reaches no point there.
     """
     _, side, height = rows.command(measurements).mean(axis=0).round(-1)
     reach = float(robot.reach_mm)
@@ -90,14 +90,15 @@ def unmatched_sets(sets, measurements):
 
 
 def unadvised(advice):
-    """A note where a campaign was to follow advice, tables with the runs first, and none was given."""
+    """A note where a campaign should follow advice (tables, the runs first) and no run was advised."""
     return ("no further run was advised, and none was added",) if advice and not len(advice[0]) else ()
 
 
 def _around_reachable(robot, grids, step_mm):
     """Points (n, 3) of the first grid of which the robot reaches some, and their actuator values (n, K).
 
-    Those in the box of what it reaches, widened by a tenth or step; all of the last grid where it reaches nothing.
+    Those in the bounding box of its reachable points, widened by a tenth or step; all of the last grid where it reaches
+    no point.
     """
     for points in grids:
         actuators = robot.planned(points)

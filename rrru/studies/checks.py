@@ -1,4 +1,4 @@
-"""Whether the configuration makes sense, asked once: the answer is kept until the configuration or the code changes."""
+"""Checks of the configuration, with a cache of the answer until the configuration or the code changes."""
 
 import hashlib
 import importlib
@@ -11,17 +11,18 @@ import yaml
 from rrru.errors import ConfigError
 from rrru.store.digest import code_digest
 
-# a larger number is a slip, and what is reckoned from it may overflow
-_MOST = 1e15
+# a larger number is a typing error, and results from it may overflow
+_MAX_NUMBER = 1e15
 _LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
 
 def check_schema(config, file):
     """Raise ConfigError with place and value where a configuration does not fit the JSON schema of a file.
 
-    By stricter types than JSON has, as YAML has more: numbers are finite, 3.0 is no count, 1 and `no` are no names.
+    Types are stricter than those of JSON, since YAML allows more: numbers are finite, 3.0 is not a count, 1 and `no`
+    are not names.
     """
-    # Snakemake brings it along
+    # installed with Snakemake
     from jsonschema import Draft202012Validator as Usual
     from jsonschema import exceptions, validators
 
@@ -37,20 +38,20 @@ def check_schema(config, file):
 
 
 def check_keys(files):
-    """Raise ConfigError with file and line where a YAML file has a key twice: YAML would keep the last one silently."""
+    """Raise ConfigError with file and line where a YAML file has a key twice: YAML silently uses the last one."""
     for file in map(Path, files):
         try:
             root = yaml.compose(file.read_text(encoding="utf-8"), Loader=_LOADER)
         except (OSError, UnicodeDecodeError, yaml.YAMLError):
-            # who reads it says so
+            # the code that reads it reports this
             continue
         for place, key in _repeated(root, ""):
             line = key.start_mark.line + 1
-            raise ConfigError(f"{file}, line {line}: {place}{key.value} stands twice; allowed: each name once")
+            raise ConfigError(f"{file}, line {line}: {place}{key.value} occurs twice; allowed: each name once")
 
 
 def _repeated(node, place):
-    """Nodes of keys that stand twice in a mapping, below a YAML node, with the place of their mapping as text."""
+    """Nodes of keys that occur twice in a mapping, below a YAML node, with the place of their mapping as text."""
     if isinstance(node, yaml.SequenceNode):
         for item in node.value:
             yield from _repeated(item, place)
@@ -66,21 +67,21 @@ def _repeated(node, place):
 
 
 def _as_number(error):
-    """What to write in place of a number that YAML takes for text, such as 8.0e7; "" where the value is none."""
+    """The correct form of a number that YAML takes for text, such as 8.0e7; "" where the value is not a number."""
     if error.validator != "type" or not isinstance(error.instance, str):
         return ""
     try:
         number = float(error.instance)
     except ValueError:
         return ""
-    # as YAML writes it: with a point and a sign in the exponent
+    # in YAML's form: with a point and a sign in the exponent
     return f"; it is text to YAML: write {yaml.safe_dump(number).split()[0]}, without quotes"
 
 
 def _meant(error):
-    """Which known keys or words the unknown ones look like, or all known keys where they look like none.
+    """Known keys or words similar to the unknown ones, or all known keys where none is similar.
 
-    Of missing keys what the schema says of them.
+    For missing keys the description of the schema.
     """
     known, unknown = [], []
     if error.validator == "required" and "description" in error.schema:
@@ -98,8 +99,8 @@ def _meant(error):
 
 
 def _is_number(value):
-    """Whether a value is a number that can be reckoned with."""
-    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= _MOST
+    """Whether a value is a finite number."""
+    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= _MAX_NUMBER
 
 
 def _is_whole(value):
@@ -112,18 +113,19 @@ def _is_mapping(value):
     return isinstance(value, dict) and all(isinstance(key, str) for key in value)
 
 
-# by JSON's name of a type what counts as one, in code and in words
+# JSON's type names with their test and its description
 _STRICT = {
-    "number": (_is_number, f"a finite number of at most {_MOST:g}"),
+    "number": (_is_number, f"a finite number of at most {_MAX_NUMBER:g}"),
     "integer": (_is_whole, "a whole number, without a point"),
     "object": (_is_mapping, "a mapping whose keys are text"),
 }
 
 
 def check_once(config, checks, files, memory):
-    """Call every check ("module:function") with the configuration, unless just this has passed them before.
+    """Call every check ("module:function") with the configuration, unless the same has passed them before.
 
-    files: those that the checks read; memory: the file that keeps what has passed. A check raises a ConfigError.
+    files: those that the checks read; memory: the file with the digest of the last passed configuration. A check raises
+    a ConfigError.
     """
     read = [hashlib.sha256(Path(file).read_bytes()).hexdigest() for file in files if Path(file).is_file()]
     code = [code_digest(check.partition(":")[0]) for check in checks]

@@ -1,6 +1,6 @@
-"""Which part of the configuration a campaign needs, as plain mappings, and whether its names fit together.
+"""The parts of the configuration that a campaign needs, as plain mappings, and the consistency check of its names.
 
-A workflow rule hands its script these parts and nothing else, so that a change reruns what it concerns.
+A workflow rule passes only these parts to its script, so that a change reruns only the affected jobs.
 """
 
 import hashlib
@@ -9,7 +9,7 @@ from pathlib import Path
 from rrru.errors import ConfigError
 from rrru.plugins import module_file
 
-# what of a campaign's section only drives it, or limits what is driven next
+# keys of a campaign's section that only drive it, or limit further runs
 _DRIVEN = ("trajectories", "passes", "advised_by", "limits")
 
 
@@ -28,14 +28,14 @@ def part(config, *keys):
 def robot(config, section):
     """The robot of a campaign's section: name, dimensions, and the set of parameters where the section chooses one.
 
-    With what is known of its readings: reflectors whose places are stated, and whether its frame was registered.
+    Includes the measurement configuration: reflectors with stated places, and whether its frame was registered.
     """
     name = section["robot"]
     dimensions = {**config["robots"].get(name, {}), **section.get("dimensions", {})}
-    # what it may be asked to do makes it no other robot
+    # limits of further runs do not change the robot
     dimensions.pop("limits", None)
     own = own_robot_file(dimensions)
-    # a robot of the user's own changes with its file
+    # the user's own robot changes with its file
     digest = {"digest": hashlib.sha256(own.read_bytes()).hexdigest()} if own and own.is_file() else {}
     chosen = {"name": name, "dimensions": dimensions, "parameter_set": section.get("errors"), **digest}
     if "targets" in section:
@@ -46,23 +46,22 @@ def robot(config, section):
 
 
 def limits(config, section):
-    """What further runs of a campaign's section may ask of its robot, as
-    `rrru.diagnosis.design.run_limits.StatedLimits` has it.
+    """Limits of further runs of a campaign's section, as for `rrru.diagnosis.design.run_limits.StatedLimits`.
 
-    Key by key the campaign's own, else the robot's.
+    For each key that of the campaign, otherwise that of the robot.
     """
     return {**config["robots"].get(section["robot"], {}).get("limits", {}), **section.get("limits", {})}
 
 
 def own_robot_file(dimensions):
-    """The file of a `robots:` entry that describes a robot of the user's own, None for a built-in one."""
+    """The file of a `robots:` entry that describes the user's own robot, None for a built-in one."""
     if "module" in dimensions:
         return module_file(dimensions["module"])
     return next((Path(dimensions[key]) for key in ("urdf", "mjcf") if key in dimensions), None)
 
 
 def corrected_kind(config, section):
-    """What the file of a campaign's robot is written back as, "xml" or "urdf"; "" for a robot without such a file."""
+    """Ending of the corrected file of a campaign's robot, "xml" or "urdf"; "" for a robot without such a file."""
     own = config["robots"].get(section["robot"], {})
     if "mjcf" in own:
         return "xml"
@@ -75,7 +74,7 @@ def nominal(config, name):
 
 
 def sets(config, name):
-    """Sets of trajectories that a campaign is calibrated on; those of the reproduced study are for its robot alone."""
+    """Sets of trajectories that a campaign is calibrated on; those of the reproduced study apply to its robot alone."""
     more = config["reproduce"]["sets"] if of_reproduced_study(config, name) else {}
     return {**more, **config["calibration"]["sets"]}
 
@@ -87,7 +86,7 @@ def of_reproduced_study(config, name):
 
 
 def source(config, name):
-    """A campaign's section without what only drives it."""
+    """A campaign's section without the keys that only drive it."""
     return {key: value for key, value in config["campaigns"][name].items() if key not in _DRIVEN}
 
 
@@ -99,7 +98,7 @@ def truth(config, name):
 
 
 def virtual(config, name):
-    """What drives a virtual campaign: robot, trajectories, passes, motion, noise and seed; None for a measured one."""
+    """Settings of a virtual campaign: robot, trajectories, passes, motion, noise and seed; None for a measured one."""
     section = config["campaigns"][name]
     if "virtual" not in section:
         return None
@@ -116,7 +115,7 @@ def virtual(config, name):
 
 
 def masses(config, section):
-    """Masses in kg, the platform's own where the campaign's section states it."""
+    """Masses in kg; that of the platform from the campaign's section where stated."""
     loads = config["loads"]
     own = config["robots"].get(section.get("robot"), {})
     if "dh" in own or own_robot_file(own):
@@ -129,7 +128,7 @@ def masses(config, section):
 
 
 def check(config):
-    """Raise ConfigError where names in a valid configuration refer to nothing."""
+    """Raise ConfigError where names in a valid configuration refer to missing entries."""
     for name, section in config["campaigns"].items():
         if "virtual" in section:
             _check_virtual(config, name, section)
@@ -154,14 +153,14 @@ def ingested_files(section):
 
 
 def entry(config, section, name, asked_by):
-    """config[section][name]; raises ConfigError naming who asked, the section and what exists."""
+    """config[section][name]; raises ConfigError naming the referring key, the section and its entries."""
     if name not in config[section]:
         raise ConfigError(f"{asked_by}: {section} has no {name!r}; known: {', '.join(config[section])}")
     return config[section][name]
 
 
 def _check_virtual(config, name, section):
-    """Raise ConfigError where a virtual campaign's robot, trajectories or passes name nothing that exists."""
+    """Raise ConfigError where a virtual campaign's robot, trajectories or passes refer to missing entries."""
     real = entry(config, "virtual_robots", section["virtual"], f"campaigns.{name}")
     if "mujoco" in real:
         from rrru.studies import setup
@@ -173,8 +172,8 @@ def _check_virtual(config, name, section):
         if section["advised_by"] == name or before.get("trajectories") != section["trajectories"]:
             allowed = "another campaign with the same trajectories"
             raise ConfigError(f"campaigns.{name}.advised_by: {section['advised_by']!r}; allowed: {allowed}")
-    for one in section.get("passes", []):
-        for wanted in one.get("trajectories", []):
+    for campaign_pass in section.get("passes", []):
+        for wanted in campaign_pass.get("trajectories", []):
             if wanted not in known:
                 raise ConfigError(f"campaigns.{name}.passes: no trajectory {wanted!r}; known: {', '.join(known)}")
 

@@ -15,13 +15,13 @@ _HEAD = """# What a run writes
 `verdict.json`, and what it was calibrated as, `robot.json`; `figures/` every figure as PDF, PNG and SVG, `timings/`
 wall times (the only files whose bytes differ from run to run), `logs/` one log per job, `sweep/` the parts of the
 sweeps. Lengths are in mm and angles in rad unless a column's name says otherwise. This page is made from the
-`schemas.py` beside each package and from `workflow/schemas/verdict.schema.yaml`.
+`schemas.py` of each package and from `workflow/schemas/verdict.schema.yaml`.
 """
 _ROOT = Path(__file__).resolve().parents[2]
 
 
 def tables():
-    """All tables by name, out of every module of the package that is called `schemas`."""
+    """All tables by name, from every module of the package named `schemas`."""
     modules = [m.name for m in pkgutil.walk_packages(rrru.__path__, "rrru.") if m.name.endswith(".schemas")]
     return {table.name: table for name in sorted(modules) for table in importlib.import_module(name).TABLES}
 
@@ -39,7 +39,7 @@ def text():
 
 
 def _answer():
-    """What stands in verdict.json, from its schema."""
+    """The keys of verdict.json, from its schema."""
     schema = yaml.safe_load((_ROOT / "workflow/schemas/verdict.schema.yaml").read_text())
     rows = [f"| `{name}` | {_keys(key)} | {key['description']} |" for name, key in schema["properties"].items()]
     heading = f"## verdict.json\n\n{schema['description']}. Schema: `workflow/schemas/verdict.schema.yaml`.\n"

@@ -1,4 +1,4 @@
-"""What a paper prints: its numbers beside a study's, and its misprints and contradictions as rows of an audit."""
+"""Printed contents of a paper: its numbers compared with a study's, and its misprints as rows of an audit."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ _ABSENT = (np.nan, np.nan)
 
 @dataclass(frozen=True)
 class Number:
-    """One printed number: item, where it stands, unit and value, and what a reader has to know about it."""
+    """One printed number: item, place in the paper, unit and value, and a note."""
 
     item: str
     source: str
@@ -29,11 +29,11 @@ def numbers(source, unit, note="", **values):
 
 @dataclass(frozen=True)
 class Finding:
-    """One misprint, contradiction or claim: what stands where, what should, and the numbers that decide.
+    """One misprint, contradiction or claim: place, printed text, correct text, and the deciding values.
 
     check: what is computed; it and `right` may hold fields such as {2:.2f} for the values. values: function without
-    arguments to what the printed form gives, what the right form gives, and whatever else decides. shows: these
-    values to whether the misprint or contradiction shows. Without both it is a matter of reading.
+    arguments that returns the value of the printed form, that of the correct form, and further deciding values. shows:
+    from these values, whether the misprint or contradiction is confirmed. Without both the text alone decides.
     """
 
     where: str
@@ -60,20 +60,20 @@ class Finding:
 
 
 def finding(where, printed, right, unit, shows):
-    """Decorator: the Finding of a function, whose docstring says what is computed; see Finding for the arguments."""
+    """Decorator: the Finding of a function, whose docstring states the computation; see Finding for the arguments."""
 
-    def of(values):
+    def finding_of(values):
         check = " ".join(values.__doc__.split()).rstrip(".")
         return Finding(where, printed, right, check[0].lower() + check[1:], unit, values, shows)
 
-    return of
+    return finding_of
 
 
 def published_rows(paper, numbers, here, spread=None, notes=None):
-    """Rows of `published` for the numbers that a paper prints, null for what is absent.
+    """Rows of `published` for the numbers that a paper prints, null for absent ones.
 
-    here, spread, notes: item to this study's number, to its (low, high) over other draws, and to what the results add
-    to the printed number's note. Raises ConfigError for an item of `here` that the paper does not print.
+    here, spread, notes: item to this study's number, to its (low, high) over other draws, and to an addition to the
+    printed number's note. Raises ConfigError for an item of `here` that the paper does not print.
     """
     known = list(dict.fromkeys(number.item for number in numbers))
     if unknown := sorted(set(here) - set(known)):
@@ -99,9 +99,9 @@ def published_rows(paper, numbers, here, spread=None, notes=None):
 
 
 def audit_rows(paper, computed, as_printed=(), lost=None):
-    """Rows of `audit`: Findings by computation, Findings as printed, and what a scan lost, {where: (what, instead)}."""
+    """Rows of `audit`: Findings by computation, Findings as printed, and lost parts, {where: (what, instead)}."""
     absent = [
-        Finding(where, f"lost: {what}", instead, "what stands in for it", shows=lambda *_: False)
+        Finding(where, f"lost: {what}", instead, "its replacement", shows=lambda *_: False)
         for where, (what, instead) in (lost or {}).items()
     ]
     parts = {"computed": computed, "as printed": as_printed, "lost": absent}

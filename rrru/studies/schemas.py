@@ -1,4 +1,4 @@
-"""Tables that every study of a paper has a part of."""
+"""Tables with rows of every study of a paper."""
 
 from rrru.store.schema import read_tables
 
@@ -6,7 +6,7 @@ TABLES = read_tables("""
 paper                  str    A: 3-RRRU; B: 3-PTT; C: Delta {A, B, C}
 
 ## published | tables/published.parquet | paper item source
-Every number that the papers print, beside what this study gives.
+Every number that the papers print, compared with this study.
 --
 paper
 item                   str    what the number is
@@ -15,8 +15,8 @@ unit                   str    unit as printed
 published              float  printed number
 here                   float? this study's number; null where it has none
 ratio                  float? here / published; null where either is null or zero
-here_low               float? lower end of the middle 90 % over other draws of wobble and noise; null where nothing is
-    drawn
+here_low               float? lower end of the middle 90 % over other draws of non-repeatability and noise; null
+    without draws
 here_high              float? upper end
 note                   str    what differs, and why
 
@@ -25,13 +25,13 @@ Misprints, contradictions and claims of the papers, each recomputed, and what th
 --
 paper
 where                  str    place in the paper
-printed                str    what stands there
-right                  str    what should
+printed                str    printed text
+right                  str    correct text
 kind                   str    computed here, compared as printed, or lost in the scan {computed, as printed, lost}
-check                  str    what is computed to show it
+check                  str    computation that shows it
 unit                   str    unit of the two values
-value_printed          float? what the printed form gives; null where it gives nothing
-value_right            float? what the right form or the independent check gives; null where it gives nothing
-shown                  bool   true where the misprint or contradiction shows; false where a claim holds, and for what
-    is lost
+value_printed          float? value of the printed form; null where it has none
+value_right            float? value of the correct form or of the independent check; null where it has none
+shown                  bool   true where the misprint or contradiction is confirmed; false where a claim holds, and
+    for lost parts
 """)

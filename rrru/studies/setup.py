@@ -1,4 +1,4 @@
-"""The only builder: from parts of the configuration, which `rrru.studies.config` makes, to robots and campaigns."""
+"""Construction of robots and campaigns from the parts of the configuration by `rrru.studies.config`."""
 
 from dataclasses import dataclass, field, replace
 
@@ -14,32 +14,32 @@ from rrru.simulation.tracker import Sees
 
 
 def mechanism(nominal, parameter_set=None):
-    """The nominal robot with a set of parameters: the given one, the campaign's, or what tracked positions identify.
+    """The nominal robot with a set of parameters: by default the campaign's, or the one for tracked positions.
 
-    Its bounds are the robot's own where the part has none.
+    Without bounds in the part, those of the robot are used.
     """
     name = nominal["name"]
     limits = {}
     if "bounds" in nominal:
         bounds = nominal["bounds"]
         limits = {"angle_limit_rad": bounds["angle_rad"], "length_limit_mm": bounds["length_mm"]}
-    own = nominal.get("parameter_set") or tracked_set(name)
-    return make_mechanism(name, nominal["dimensions"], parameter_set=parameter_set or own, **limits)
+    default = nominal.get("parameter_set") or tracked_set(name)
+    return make_mechanism(name, nominal["dimensions"], parameter_set=parameter_set or default, **limits)
 
 
 def measured_robot(nominal, measurements, parameter_set=None):
-    """The `mechanism` of a campaign that has been measured: its parameters are those that these poses can tell.
+    """The `mechanism` of a measured campaign, with the parameters that are identifiable from its poses.
 
-    With those that its readings leave open: frame, tool, places of reflectors.
+    These include the open ones of its measurement configuration: frame, tool, places of reflectors.
     """
     robot = mechanism(nominal, parameter_set)
     return as_measured(robot, measurements, nominal.get("targets", ()), nominal.get("registered", False))
 
 
 def as_measured(robot, measurements, targets=(), registered=False):
-    """A nominal robot with the numbers that the poses of a measurement table can tell; see `measured_robot`.
+    """A nominal robot with the parameters identifiable from a measurement table; see `measured_robot`.
 
-    targets: reflectors whose places are stated; registered: the frame was.
+    targets: reflectors with stated places; registered: whether the frame was registered.
     """
     robot = robot.reading(rows.reads(measurements, targets, registered))
     measurements = register_measurements(measurements, robot)
@@ -50,10 +50,11 @@ def as_measured(robot, measurements, targets=(), registered=False):
 
 @dataclass(frozen=True)
 class VirtualCampaign:
-    """A campaign of a virtual robot: the robot, what it is told to do and the tracker's noise.
+    """A campaign of a virtual robot: the robot, its plan and the tracker's noise.
 
-    origin: first label of its random streams, beside its name; drive: actuator values (N, k) that the controller wants,
-    in the order driven, to those sent to the motors, None where these are the same; sees: what the tracker reads.
+    origin: first label of its random streams, in addition to its name; drive: actuator values (N, k) that the
+    controller wants, in the order driven, to those sent to the motors, None where these are the same; sees: what the
+    tracker reads.
     """
 
     robot: DrivenRobot
@@ -85,10 +86,10 @@ class VirtualCampaign:
 
 
 def real_robot(nominal, section):
-    """The virtual robot that an entry of `virtual_robots:` makes of a nominal one; see `virtual_campaign`."""
+    """The virtual robot of a nominal one and an entry of `virtual_robots:`; see `virtual_campaign`."""
     if "mujoco" not in section:
         return virtual_robot.from_config(mechanism(nominal), section)
-    # a simulator is not small, and other robots do not need it
+    # a large import that other robots do not need
     from rrru.simulation import mujoco_robot
 
     return mujoco_robot.from_config(mechanism(nominal), nominal["dimensions"], section)

@@ -268,7 +268,7 @@ def test_parts_are_drawn_found_against_true():
     figure = draw("withheld", frames)
     for check, title in (("many", "parts, many causes"), ("noise", "parts, noise not")):
         parts = frames["withheld_parts"].query(f"check == '{check}' and kind == 'scatter' and named")
-        line = next(one for one in panel(figure, title).lines if one.get_label() == "scatter")
+        line = next(one for one in panel(figure, title).lines if one.get_label() == "non-repeatability")
         np.testing.assert_allclose(sorted(line.get_xdata()), sorted(parts["true_rms_mm"].clip(withheld._LEAST_MM)))
         assert line.get_markerfacecolor() != "white" and len(line.get_xdata()) == len(parts) > 0
 

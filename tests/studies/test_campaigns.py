@@ -1,4 +1,4 @@
-"""What is told of a campaign before anything is fitted: the workspace of gantries, whose slides are all their reach."""
+"""Tables of a campaign before any fit: the workspace of gantries, where the slides are the whole reach."""
 
 from itertools import product
 

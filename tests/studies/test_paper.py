@@ -1,4 +1,4 @@
-"""Rows that all papers share: numbers beside a study's, and findings whose verdict hangs on their numbers."""
+"""Rows that all papers share: numbers compared with a study's, and findings decided by their numbers."""
 
 import numpy as np
 import pytest
@@ -57,12 +57,12 @@ def test_every_misprint_shows_by_its_numbers_alone(finding):
     holds = finding.right == "they do, in rank"
     assert bool(finding.shows(*values)) != holds
     assert not finding.shows(*np.full(len(values), np.nan))
-    equality = ("= +-112", "R and r shift", "upright links", "only a travel", "det J vanishes", "lies on the line")
+    equality = ("= +-112", "R and r shift", "upright links", "only a travel", "det J vanishes", "is on the line")
     if not any(text in finding.right for text in equality):
         assert not finding.shows(values[1], values[1], *values[2:])
 
 
-def test_what_is_only_read_is_told_apart():
+def test_findings_from_the_text_alone_are_marked():
     rows = {module.__name__: module.audit_rows() for module in (audit_a, audit_b, audit_c)}
     counts = {name: (len(frame), int(frame["shown"].sum())) for name, frame in rows.items()}
     assert list(counts.values()) == [(21, 21), (28, 8), (18, 8)]

@@ -111,7 +111,7 @@ def _munged(folder):
 
 
 def _free_ports(count):
-    """Numbers of ports that nobody uses."""
+    """Numbers of unused ports."""
     with contextlib.ExitStack() as held:
         sockets = [held.enter_context(socket.socket()) for _ in range(count)]
         for one in sockets:
@@ -121,7 +121,7 @@ def _free_ports(count):
 
 @contextlib.contextmanager
 def _daemon(folder, name, *options):
-    """A daemon that is told to end at the end, and killed where it does not."""
+    """A daemon that is asked to end at the end, and killed where it does not."""
     with (folder / f"{name}.out").open("w") as log:
         process = subprocess.Popen([_place(name), *options], stdout=log, stderr=subprocess.STDOUT)
         try:

@@ -43,7 +43,7 @@ def test_the_second_campaign_ends_with_the_run_that_the_first_was_advised(folder
     assert abs(starts[int(advised["reverse"])] - first).max() < 1e-9
 
 
-def test_the_advised_run_settles_what_was_in_doubt(folder):
+def test_the_advised_run_settles_an_uncertain_verdict(folder):
     before, after = (_of(folder, name, "gap_verdicts").iloc[0] for name in ("first", "second"))
     assert before["confusable_with"] != "" and before["probability"] < 0.9
     assert after["effects"] == "backlash+drive_compliance" and after["confusable_with"] == ""

@@ -72,7 +72,7 @@ def test_over_robots_lengths_hurt_and_the_base_frame_needs_the_tracker(results, 
     assert (robots["plane_median_mm"] <= robots["plane_high_mm"]).all()
     # what knows the base frame is nearest to the truth there, on one robot another may be lucky
     assert large["base_median_mm"].idxmin() in ("tracker_positions", "tracker_heights")
-    # without length errors and noise of the camera every variant is exact but for the tracker's noise and the paper's
+    # without length errors and camera noise every variant is exact except for the tracker's noise and the paper's
     # one step
     for name in ("true_centres", "true_centres_two_heights", "tracker_positions"):
         assert small.loc[name, "base_median_mm"] < 4.0 * config["delta"]["tracker_noise_mm"]

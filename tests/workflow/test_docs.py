@@ -1,6 +1,6 @@
 """Every code block of README and docs does what a reader would do with it.
 
-A page's Python runs as one program, beside the results of the workflow's shared run. YAML is an overlay of which a dry
+A page's Python runs as one program, next to the results of the workflow's shared run. YAML is an overlay of which a dry
 run makes a plan; keys under "# part of a campaign" are tried in one. Of a shell's lines `snakemake` is run dry, and
 `make` says what it would do. A comment `<!-- file: name -->` before a block is the name that a reader saves it under.
 `text` is not for running.
@@ -52,16 +52,16 @@ def _shell(line, folder):
     if not words or words[0] == ".":
         return 0, ""
     if words[0] == "make":
-        told = subprocess.run(["make", "-n", *words[1:]], cwd=folder, capture_output=True, text=True, check=False)
-        return told.returncode, told.stdout + told.stderr
+        finished = subprocess.run(["make", "-n", *words[1:]], cwd=folder, capture_output=True, text=True, check=False)
+        return finished.returncode, finished.stdout + finished.stderr
     if words[0] == "rrru-printer":
         program = [sys.executable, "-c", "from rrru.studies.printers.command import main; main()", *words[1:]]
-        told = subprocess.run(program, cwd=folder, capture_output=True, text=True, check=False)
-        return told.returncode, told.stdout + told.stderr
+        finished = subprocess.run(program, cwd=folder, capture_output=True, text=True, check=False)
+        return finished.returncode, finished.stdout + finished.stderr
     assert words[0] == "snakemake" and words[1] in ("--cores", "--profile"), f"no way to try {line!r}"
-    told = words[3:] if words[1] == "--cores" else words[1:]
-    split = told.index("--configfile") if "--configfile" in told else len(told)
-    return dry_run(folder, *told[:split], overlays=tuple(told[split + 1 :]))
+    arguments = words[3:] if words[1] == "--cores" else words[1:]
+    split = arguments.index("--configfile") if "--configfile" in arguments else len(arguments)
+    return dry_run(folder, *arguments[:split], overlays=tuple(arguments[split + 1 :]))
 
 
 def _overlay(text, folder, name):
@@ -95,10 +95,10 @@ def test_blocks_of_a_page_do_what_they_say(page, results, tmp_path, monkeypatch)
             _overlay(text, tmp_path, name or "mine.yaml")
         elif kind == "sh":
             _commands(text, tmp_path)
-    told = subprocess.run(
+    finished = subprocess.run(
         [sys.executable, "-"], input="\n".join(program), cwd=tmp_path, capture_output=True, text=True, check=False
     )
-    assert told.returncode == 0, told.stderr
+    assert finished.returncode == 0, finished.stderr
 
 
 def test_every_link_of_a_page_leads_somewhere():

@@ -17,7 +17,7 @@ _TARGETS = tuple(f"build/minimal/campaigns/field_09/{name}.parquet" for name in 
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory):
-    """Digests of a run that nobody disturbed."""
+    """Digests of an undisturbed run."""
     folder = tmp_path_factory.mktemp("whole")
     code, output = run(folder, *_TARGETS)
     assert code == 0, output

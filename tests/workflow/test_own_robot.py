@@ -192,7 +192,7 @@ def test_an_own_robot_that_cannot_be_made_is_refused(entry, text):
         make_mechanism("mine", entry, parameter_set="full")
 
 
-def test_numbers_that_others_imitate_are_left_out_and_said_so():
+def test_parameters_that_are_not_identifiable_are_left_out_and_named():
     """Of an arm's numbers the rank chooses; what is left out is a stated combination of the chosen ones."""
     arm = make_mechanism("arm", {"urdf": str(ROOT / "data/models/arm6.urdf")}, parameter_set="full")
     assert len(arm.parameters) < len(arm.candidates)

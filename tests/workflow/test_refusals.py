@@ -46,7 +46,7 @@ from tests.workflow.folder import dry_run, run
         ("ptt: {network: {train: 180}}", "ptt.network.train is 180"),
         (
             "campaigns:\n  mine: {robot: rrru3, ingest: a.csv}\n  mine: {robot: delta, ingest: b.csv}",
-            "wrong.yaml, line 3: campaigns.mine stands twice",
+            "wrong.yaml, line 3: campaigns.mine occurs twice",
         ),
         ("ptt: {joint: {all: [ptt_9, ptt_1]}}", "ptt.joint.all: no experiment 'ptt_9'"),
     ],

@@ -72,8 +72,8 @@ def test_a_study_through_slurm_ends_with_the_same_bytes_though_a_job_is_killed(t
 def _submitted(folder, environment):
     """A running snakemake whose jobs go to a cluster that keeps no accounts."""
     link(folder)
-    told = ("--slurm-status-command", "squeue", "--slurm-init-seconds-before-status-checks", "2")
-    command = [SNAKEMAKE, *_PROFILE, *told, _TABLE, "--configfile", MINIMAL]
+    options = ("--slurm-status-command", "squeue", "--slurm-init-seconds-before-status-checks", "2")
+    command = [SNAKEMAKE, *_PROFILE, *options, _TABLE, "--configfile", MINIMAL]
     environment = environment | {"PYTHONPATH": str(ROOT)}
     with (folder / "log").open("w") as log:
         return subprocess.Popen(command, cwd=folder, env=environment, stdout=log, stderr=subprocess.STDOUT)

@@ -42,8 +42,8 @@ def test_no_diagnosis_is_given_an_answer(jobs):
     assert len(answers) == 3
     assert {rule for rule, _, outputs in jobs if outputs & answers} == {"withheld_robots"}
     # the advised run is driven by the robot itself
-    told = {"withheld_score", "withheld_methods", "withheld_advice"}
-    assert {rule for rule, inputs, _ in jobs if inputs & answers} == told
+    with_truth = {"withheld_score", "withheld_methods", "withheld_advice"}
+    assert {rule for rule, inputs, _ in jobs if inputs & answers} == with_truth
     for rule, inputs, outputs in jobs:
         if rule == "withheld_beliefs":
             assert {Path(path).stem for path in inputs} == {"withheld_measurements"}

@@ -11,7 +11,7 @@ from rrru.studies import setup
 
 
 def main(settings, inputs, outputs):
-    """Write the campaign's calibrations, parameters and their gauge, correlations and observability.
+    """Write the campaign's calibrations, parameters, fixed non-identifiable parameters, correlations and observability.
 
     And what the robot was taken for, with which the calibration can be applied to other measurements.
     """
@@ -24,8 +24,8 @@ def main(settings, inputs, outputs):
     truth = setup.true_deviations(robot, settings["truth"])
     gauge = pd.DataFrame(list(robot.gauge.items()), columns=["number", "stands_for"])
     frames = {"gauge": gauge.assign(campaign=settings["campaign"])}
-    told = {"noise_mm": noise.mm, "arm_mm": noise.arm_mm, "calibration": settings["calibration"]}
-    json_files.write({"nominal": nominal, **told}, outputs["robot"])
+    fitted = {"noise_mm": noise.mm, "arm_mm": noise.arm_mm, "calibration": settings["calibration"]}
+    json_files.write({"nominal": nominal, **fitted}, outputs["robot"])
     tables.write_all(TABLES, frames | campaign_fit.tables(settings["campaign"], fits, truth), outputs)
 
 

@@ -18,7 +18,7 @@ def main(settings, inputs, outputs):
         measurements, truth = setup.virtual_campaign(nominal, settings["virtual"], advice or None).run()
         notes, registration = campaigns.unadvised(advice), None
     else:
-        # what reads files is not small, and virtual campaigns do not need it
+        # a large import that virtual campaigns do not need
         from rrru.campaign.ingest.campaign_file import ingest
         from rrru.campaign.ingest.spec import IngestSpec
 

@@ -1,4 +1,4 @@
-"""A robot's file, its calibration and its corrected file on a campaign that none of them has seen."""
+"""A robot's file, its calibration and its corrected file on a held-out campaign."""
 
 from rrru.calibration.campaign_fit import deviation_vector
 from rrru.kinematics.dynamics import Masses
@@ -10,7 +10,7 @@ from rrru.studies.end_to_end.schemas import TABLES
 
 
 def main(settings, inputs, outputs):
-    """Write what each model leaves of the fresh campaign."""
+    """Write the errors of each model on the new campaign."""
     section, nominal = settings["circle"], settings["nominal"]
     robot = setup.measured_robot(nominal, tables.read(inputs["measurements"]))
     deviations = deviation_vector(tables.read(inputs["parameters"]), section["calibration"], "least_squares", robot)

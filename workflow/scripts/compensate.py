@@ -11,7 +11,7 @@ from rrru.studies import setup
 
 
 def main(settings, inputs, outputs):
-    """Write the campaign's errors point by point and summed up."""
+    """Write the campaign's errors point by point and summarised."""
     nominal = settings["nominal"]
     measurements = tables.read(inputs["measurements"])
     mechanism = setup.measured_robot(nominal, measurements)
@@ -23,7 +23,7 @@ def main(settings, inputs, outputs):
         virtual = setup.virtual_campaign(nominal, settings["virtual"])
 
         def drive(controller):
-            # every calibration is driven with the same draws, so that differences are the calibrations'
+            # every calibration has the same draws, so that differences come from the calibrations alone
             return virtual.run(controller, "closed_loop")[0]
 
     errors = evaluate.under_calibrations(measurements, mechanism, parameters, drive)

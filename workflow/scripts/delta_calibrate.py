@@ -1,4 +1,4 @@
-"""Every variant of the Delta's zero calibration, fed back and measured again."""
+"""Every variant of the Delta's zero calibration, applied and measured again."""
 
 from rrru.store import tables
 from rrru.store.job import run
@@ -10,7 +10,7 @@ from rrru.studies.delta.virtual_delta import twin
 
 
 def main(settings, inputs, outputs):
-    """Write calibrations, what they see, errors on the plane, those of other draws and robots, and the camera."""
+    """Write calibrations, observability, errors on the plane, those of other draws and robots, and the camera."""
     centres, truth = tables.read(inputs["delta_centres"]), tables.read(inputs["delta_truth"])
     robot, section = twin(settings), settings["delta"]
     others = spread.Spread(**section["spread"])

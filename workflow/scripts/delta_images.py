@@ -1,4 +1,4 @@
-"""The images that the Delta's camera takes, and where it truly was."""
+"""The images of the Delta's camera, and its true poses."""
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from rrru.studies.delta.virtual_delta import twin
 
 
 def main(settings, inputs, outputs):
-    """Write both sets of images, and the truth apart from them."""
+    """Write both sets of images, and the truth separately."""
     view, truth = views.scene(settings), views.true_poses(settings)
     by_hand, mounted = (twin(settings).generator(f"{kind} images") for kind in ("tilted", "pose"))
     tilted = view.images(view.tilted_places(by_hand), by_hand)

@@ -1,4 +1,4 @@
-"""Search for the Delta's twin: one virtual robot as near to paper C's numbers as it can be."""
+"""Search for the Delta's twin: the virtual robot nearest to paper C's numbers."""
 
 from rrru.store import overlay, tables
 from rrru.store.job import run

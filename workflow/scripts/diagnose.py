@@ -1,4 +1,4 @@
-"""Diagnosis of one campaign's gap between the calibrated sim and what was measured, with its figures."""
+"""Diagnosis of one campaign's gap between calibrated model and measurements, with its figures."""
 
 import pandas as pd
 
@@ -17,7 +17,7 @@ from rrru.studies import setup
 
 
 def main(settings, inputs, outputs):
-    """Write the verdict and everything behind it, and draw it."""
+    """Write the verdict, its tables and its figures."""
     measurements, masses = tables.read(inputs["measurements"]), Masses(**settings["masses"])
     nominal = setup.measured_robot(settings["robot"], measurements)
     noise = {key: settings[key] for key in ("noise_mm", "noise_rad", "noise_known")}
@@ -27,15 +27,15 @@ def main(settings, inputs, outputs):
     chosen = GapSettings.from_config(settings["gap"], settings["seed"], settings["use_near_singularity"])
     result = diagnose(measurements, robot, chosen)
     if "corrected" in outputs:
-        # MuJoCo is loaded where a file is written only
+        # MuJoCo is loaded only where a file is written
         from rrru.diagnosis.correction.corrected_model import write_corrected
 
         result = write_corrected(
             result, settings["robot"]["dimensions"], masses, outputs["corrected"], settings["seed"]
         )
     words = drive_words(nominal)
-    told = answer(settings["campaign"], result.verdict, result.tables, words)
-    json_files.write(told, outputs["verdict"])
+    facts = answer(settings["campaign"], result.verdict, result.tables, words)
+    json_files.write(facts, outputs["verdict"])
     frames = {"gap_verdicts": pd.DataFrame([result.verdict]), **result.tables}
     keys = {table.name: table.key for table in TABLES}
     frames = {

@@ -1,4 +1,4 @@
-"""The genetic algorithm with the chosen settings on every calibration set of one campaign, beside least squares."""
+"""The genetic algorithm with the chosen settings on all calibration sets of a campaign, compared with least squares."""
 
 import pandas as pd
 from tqdm import tqdm
@@ -23,10 +23,10 @@ def main(settings, inputs, outputs):
 
 
 def _runs(settings, inputs, searched):
-    """Frames by table of all runs; searched: the set of parameters that they search."""
+    """Frames by table of all runs; searched: the searched set of parameters."""
     genetic, name, nominal = settings["genetic"], settings["campaign"], settings["nominal"]
     calibration = settings["calibration"]
-    # its objective knows positions of the tool alone, in the robot's frame
+    # its objective uses positions of the tool only, in the robot's frame
     measurements = at_tool(tables.read(inputs["measurements"]), setup.mechanism(nominal))
     robots = [setup.measured_robot(nominal | {"registered": False}, measurements, one) for one in (searched, None)]
     runs = Runs(GeneticSettings.from_config(genetic), genetic["seeds"], settings["seed"], (name,))

@@ -22,7 +22,7 @@ def main(settings, inputs, outputs):
 
 
 def _from_images(one, calibrations, poses):
-    """What the Delta's study found from its images by the paper's way, and the time of its poses."""
+    """The estimate of the Delta's study from its images by the paper's method, and the time of its poses."""
     found = calibrations.set_index("variant").loc["paper"]
     return {
         "dtheta_rad": found[[f"dtheta{leg}_found_rad" for leg in (1, 2, 3)]].to_numpy(dtype=float),

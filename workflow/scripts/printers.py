@@ -1,4 +1,4 @@
-"""Linear-delta printers: what their owners measured, calibrated here and compared with what their firmware saved."""
+"""Linear-delta printers calibrated from their owners' measurements, and compared with their firmware's answers."""
 
 from rrru.store import tables
 from rrru.store.job import run, tell
@@ -8,7 +8,7 @@ from rrru.studies.printers.schemas import TABLES
 
 
 def main(settings, inputs, outputs):
-    """Write the tables of the printers; says which saved answers do not belong to their readings."""
+    """Write the tables of the printers; log saved answers that do not belong to their readings."""
     frames = printer_tables.tables(read_all(inputs["files"]), settings["printers"])
     columns = {table.name: table.names for table in TABLES}
     frames = {name: frame.reindex(columns=columns[name]) for name, frame in frames.items()}

@@ -1,4 +1,4 @@
-"""What the experiments of paper B teach, and the robot driven again with it."""
+"""Learning from the experiments of paper B, and the robot driven again with the corrections."""
 
 import pandas as pd
 

@@ -1,4 +1,4 @@
-"""Kinematics, singularities, backlash and repeatability of paper B's robot, and what its experiments measure."""
+"""Kinematics, singularities, backlash and repeatability of paper B's robot, and the measurements of its experiments."""
 
 from rrru.campaign.schemas import measurement_table
 from rrru.robots.ptt3 import Ptt3
@@ -10,7 +10,7 @@ from rrru.studies.ptt3.schemas import TABLES
 
 
 def main(settings, inputs, outputs):
-    """Write the tables of all that comes before the experiments, then what the tracker sees in every one of them."""
+    """Write the tables before the experiments, then the measurements of each experiment."""
     encoder, backlash = bench.backlash(settings)
     frames = {
         "ptt_kinematics": bench.kinematics(settings),

@@ -1,4 +1,4 @@
-"""The papers' numbers beside the studies' own, and the audit of their misprints."""
+"""The papers' numbers compared with the studies', and the audit of their misprints."""
 
 import importlib
 
@@ -10,7 +10,7 @@ from rrru.studies.schemas import TABLES
 
 
 def main(settings, inputs, outputs):
-    """Write both tables, one paper below the other; settings: {letter: its study's package, tables and settings}."""
+    """Write both tables, concatenated over the papers; settings: {letter: its study's package, tables and settings}."""
     published, audit = [], []
     for paper in settings.values():
         numbers, findings = (importlib.import_module(f"{paper['study']}.{name}") for name in ("published", "audit"))

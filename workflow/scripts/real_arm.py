@@ -1,4 +1,4 @@
-"""One data set of real arms: its series' tables together, and what carries from one series to another."""
+"""One data set of real arms: the tables of its series, and the transfer of models between series."""
 
 import json
 from pathlib import Path
@@ -15,7 +15,7 @@ from rrru.studies.real.series import found, missing
 
 
 def main(settings, inputs, outputs):
-    """Write the tables of a data set, empty where its files are not here, and draw a page of its series."""
+    """Write the tables of a data set, empty where its files are missing, and draw a page of its series."""
     name = settings["set"]
     series = found(settings["real"], name)
     if not series:
@@ -31,9 +31,9 @@ def main(settings, inputs, outputs):
 
 
 def _carried(series, settings, inputs):
-    """Rows of `real_carried` of the series that could be used."""
-    told = zip(series, inputs.get("model", ()), inputs.get("measurements", ()), strict=True)
-    known = [(one, json.loads(Path(numbers).read_text()), seen) for one, numbers, seen in told]
+    """Rows of `real_carried` of the usable series."""
+    parts = zip(series, inputs.get("model", ()), inputs.get("measurements", ()), strict=True)
+    known = [(one, json.loads(Path(numbers).read_text()), seen) for one, numbers, seen in parts]
     known = [one for one in known if one[1] is not None]
     if len(known) < 2:
         return carried(())

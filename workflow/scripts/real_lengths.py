@@ -1,4 +1,4 @@
-"""One data set of machines of which only lengths are known: their frame, and what their lengths miss."""
+"""One data set of machines with measured lengths only: their frame, and the effects in their lengths."""
 
 import pandas as pd
 
@@ -15,7 +15,7 @@ _STUDIES = {"belts": belts.study, "cables": cables.study}
 
 
 def main(settings, inputs, outputs):
-    """Write the tables of a data set, empty where its files are not here, and draw a page of its series."""
+    """Write the tables of a data set, empty where its files are missing, and draw a page of its series."""
     name, real = settings["set"], settings["real"]
     series, study = found(real, name), _STUDIES[real["sets"][name]["kind"]]
     if not series:
@@ -30,7 +30,7 @@ def main(settings, inputs, outputs):
 
 
 def _tables(series, study):
-    """Tables of one series by name, of one that is refused the row that says why."""
+    """Tables of one series by name, or for a refused one the row with the reason."""
     try:
         frames = study(series.read(), dict(series.section) | {"files": str(series.file)}, series.dataset)
     except RrruError as error:

@@ -1,4 +1,4 @@
-"""One series of a real arm: calibrated, diagnosed and judged on rows that no fit has seen; why, where it is refused."""
+"""One series of a real arm: calibrated, diagnosed and evaluated on held-out rows, or refused with a reason."""
 
 import json
 from pathlib import Path
@@ -11,19 +11,19 @@ from rrru.store import tables
 from rrru.store.atomic_write import whole
 from rrru.store.job import run, tell
 from rrru.studies.real import arm_tables, arms
-from rrru.studies.real.carry import told
+from rrru.studies.real.carry import saved_values
 from rrru.studies.real.refusals import refused
 from rrru.studies.real.schemas import SERIES_TABLES
 from rrru.studies.real.series import found
 
 
 def main(settings, inputs, outputs):
-    """Write the tables of a series, its measurements, and in `model` what of it carries to others."""
+    """Write the tables of a series, its measurements, and in `model` the values that apply to other series."""
     series = next(one for one in found(settings["real"], settings["set"]) if one.name == settings["series"])
     chosen = GapSettings.from_config(settings["gap"] | settings["real"]["gap"], settings["seed"])
     try:
         studied = arms.study(series, settings["robots"], chosen, Path(outputs["model"]).with_name("sheet.parquet"))
-        frames, measurements, model = arm_tables.tables(studied), studied.measurements, told(studied)
+        frames, measurements, model = arm_tables.tables(studied), studied.measurements, saved_values(studied)
     except RrruError as error:
         tell(f"{series.name}: left out: {error}")
         frames, measurements, model = refused(series, error), pd.DataFrame(), None

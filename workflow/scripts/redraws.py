@@ -1,4 +1,4 @@
-"""What of the paper holds for the reproduced robot under other draws of wobble and noise, and what was searched."""
+"""Results of the reproduced robot for other draws of non-repeatability and noise, and the searched numbers."""
 
 from rrru.store import tables
 from rrru.store.job import run

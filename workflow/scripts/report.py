@@ -1,11 +1,11 @@
-"""One page of what a run has written, or of one campaign."""
+"""One page of the results of a run, or of one campaign."""
 
 from rrru.report import page
 from rrru.store.job import run
 
 
 def main(settings, inputs, outputs):
-    """Write the page; what lies in the results' folder is shown, whether this run has made it or an earlier one."""
+    """Write the page with the contents of the results' folder, from this run or an earlier one."""
     page.write(settings["results"], outputs["report"], settings["reproduced"], settings.get("campaign"))
 
 

@@ -1,4 +1,4 @@
-"""All runs of the sweeps, and whether a setting's effect can be told from the seeds' scatter."""
+"""All runs of the sweeps, and whether a setting's effect is distinguishable from the seeds' scatter."""
 
 import pandas as pd
 
@@ -11,7 +11,7 @@ from rrru.studies.rrru3.sweep_match import sweep_match
 
 
 def main(settings, inputs, outputs):
-    """Write the runs and their history, the tests of their values, and the readings beside the printed tables."""
+    """Write the runs and their history, tests of their values, and interpretations compared with the printed tables."""
     frames = {
         name: pd.concat([tables.read(path) for path in inputs[name]], ignore_index=True)
         for name in ("sweep_runs", "sweep_history", "sweep_parameters")

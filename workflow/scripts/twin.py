@@ -1,4 +1,4 @@
-"""Search for the twin: one virtual robot and one spiral as near to the paper's numbers as they can be."""
+"""Search for the twin: the virtual robot and spiral nearest to the paper's numbers."""
 
 import logging
 
@@ -12,7 +12,7 @@ def main(settings, inputs, outputs):
     """Write the twin as an overlay of the configuration."""
     virtual, section = settings["virtual"], settings["twin"]
     campaign = setup.virtual_campaign(settings["nominal"], virtual)
-    # not the draws that `redraws` counts over
+    # other draws than those of `redraws`
     pairs = [
         [campaign.generator("twin", number, name) for name in ("measure", "closed_loop")]
         for number in range(section["draws"])
@@ -31,7 +31,7 @@ def main(settings, inputs, outputs):
 
 
 def _log(intermediate_result):
-    """Tell how far a generation has come."""
+    """Log the progress of a generation."""
     logging.info("generation %d: misfit %.3f", intermediate_result.nit, intermediate_result.fun)
 
 

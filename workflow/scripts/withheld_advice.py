@@ -1,4 +1,4 @@
-"""The advised run of ambiguous robots driven, added and diagnosed, beside one drawn at random."""
+"""The advised run of ambiguous robots driven, added and diagnosed, compared with a random run."""
 
 import pandas as pd
 
@@ -15,10 +15,10 @@ from rrru.studies.blind_validation.schemas import TABLES
 
 
 def main(settings, inputs, outputs):
-    """Write how many ambiguous robots the advice settles; of all chunks only those robots' points are kept."""
+    """Write how many ambiguous robots the advice settles; reads only those robots' points from the chunks."""
     verdicts = tables.read(inputs["withheld_verdicts"], columns=UNSURE)
     names = ambiguous(verdicts, settings["withheld"]["advice"])
-    # no robot is called ""
+    # no robot has the name ""
     chosen = [("robot", "in", names or [""])]
     conditions, library = Conditions.from_config(settings), GapSettings.from_config(settings["gap"], settings["seed"])
     mechanism, masses = setup.mechanism(settings["robot"]), Masses(**settings["masses"])

@@ -1,4 +1,4 @@
-"""What the diagnosis and other ways to find a cause say about robots of a chunk, from their measurements alone."""
+"""Answers of the diagnosis and of other methods on robots of a chunk, from their measurements alone."""
 
 import pandas as pd
 
@@ -13,7 +13,7 @@ from rrru.studies.blind_validation.schemas import TABLES
 
 
 def main(settings, inputs, outputs):
-    """Write the beliefs about the chosen robots of a chunk."""
+    """Write the answers on the chosen robots of a chunk."""
     gap = GapSettings.from_config(settings["gap"], settings["seed"])
     robot, masses = setup.mechanism(settings["robot"]), Masses(**settings["masses"])
     measured = tables.read(inputs["withheld_measurements"]).drop(columns="kind").groupby("robot")

@@ -24,9 +24,11 @@ def main(settings, inputs, outputs):
         points = rows.drop(columns=["robot", "kind"]).reset_index(drop=True)
         check, taken_out, file = settings["robots"][name]
         known = library.without(taken_out) if taken_out else library
-        told = settings["files"].get(file, settings)
-        robot = setup.measured_robot(told["robot"], points) if file else setup.mechanism(told["robot"])
-        result = diagnose(points, MeasuredRobot(robot, Masses(**told["masses"]), noise_mm, name), known, details=False)
+        conditions = settings["files"].get(file, settings)
+        robot = setup.measured_robot(conditions["robot"], points) if file else setup.mechanism(conditions["robot"])
+        result = diagnose(
+            points, MeasuredRobot(robot, Masses(**conditions["masses"]), noise_mm, name), known, details=False
+        )
         verdicts.append({"check": check, "robot": name, "kind": kind} | {key: result.verdict[key] for key in VERDICT})
         causes.append(stated(name, result))
         numbers = fitted(parameter_rows(result.inference))

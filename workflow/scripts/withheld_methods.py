@@ -1,4 +1,4 @@
-"""What the diagnosis and other ways to find a cause say beside the answers."""
+"""Answers of the diagnosis and of other methods compared with the truth."""
 
 import pandas as pd
 

@@ -1,4 +1,4 @@
-"""The robots of a chunk drawn and driven: the answers, and all that the diagnosis is given."""
+"""The robots of a chunk drawn and driven: the truth, and the input of the diagnosis."""
 
 import pandas as pd
 
@@ -10,7 +10,7 @@ from rrru.studies.blind_validation.schemas import tables_of
 
 
 def main(settings, inputs, outputs):
-    """Write answers and measurements of a chunk, one robot below the other."""
+    """Write answers and measurements of a chunk, concatenated over the robots."""
     conditions, answers, driven = all_conditions(settings), [], []
     for member in map(Member._make, settings["members"]):
         robot, measurements = drawn(member, conditions[member.file])

@@ -1,4 +1,4 @@
-"""The verdicts of a chunk beside the answers."""
+"""The verdicts of a chunk compared with the truth."""
 
 from rrru.diagnosis.settings import GapSettings
 from rrru.store import tables

@@ -8,8 +8,8 @@ from rrru.studies.blind_validation.sentences.score import sentences
 
 def main(settings, inputs, outputs):
     """Write the table of sentences."""
-    told = tables.read(inputs["withheld_statements"])
-    tables.write_all(TABLES, {"sentences": sentences(told)}, outputs)
+    statements = tables.read(inputs["withheld_statements"])
+    tables.write_all(TABLES, {"sentences": sentences(statements)}, outputs)
 
 
 if __name__ == "__main__":

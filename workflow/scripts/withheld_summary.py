@@ -8,7 +8,7 @@ from rrru.studies.blind_validation.summary import CAUSES, LIMITS, PARTS, confusi
 
 
 def main(settings, inputs, outputs):
-    """Write the tables of the check; field campaigns join it where they and their answers are given."""
+    """Write the tables of the check; field campaigns are included where they and their answers are given."""
     schemas, field = {table.name: table for table in TABLES}, _of_field(inputs)
     for name in (name for name in inputs if name in outputs):
         more = [tables.typed(schemas[name], field[name])] if name in field else []

@@ -1,6 +1,6 @@
-"""Whether advice settles what is ambiguous: the advised run driven, added and diagnosed, beside a run drawn at random.
+"""Whether an advised run settles an ambiguous verdict, compared with a random run: driven, added and diagnosed.
 
-The advice sees measurements alone; the robot that drives it is the one that made them. Lengths mm, times s.
+The advice uses measurements alone. The robot that made them also drives the advised run. Lengths mm, times s.
 """
 
 from dataclasses import dataclass, replace
@@ -13,11 +13,11 @@ from rrru.diagnosis.design.advise import candidates
 from rrru.diagnosis.diagnose import Diagnosis, diagnose
 from rrru.seeds import stream
 from rrru.studies.advised import advised_runs
-from rrru.studies.blind_validation.noise import NoiseLaw, with_noise
+from rrru.studies.blind_validation.noise import NoiseModel, with_noise
 from rrru.studies.blind_validation.summary import wilson
 from rrru.studies.blind_validation.verdicts import is_right
 
-# as sure as this, and right, an answer is settled; times that the advice is followed one after another
+# a correct answer of this probability is settled; number of rounds in which the advice is followed
 SURE, ROUNDS = 0.9, 3
 ARMS = ("advised", "random")
 # columns of withheld_verdicts that `ambiguous` reads
@@ -32,7 +32,7 @@ _GROUPS = {
 
 @dataclass(frozen=True)
 class Arm:
-    """A robot's measurements with the runs that were added, those runs of its plan, and the diagnosis of all."""
+    """A robot's measurements including added runs, the added runs of its plan, and the diagnosis of all."""
 
     measurements: pd.DataFrame
     runs: tuple
@@ -40,15 +40,16 @@ class Arm:
 
     @property
     def advised(self):
-        """The first row of `gap_next_runs` as a mapping, None where the verdict is sure or nothing is advised."""
+        """The first row of `gap_next_runs` as a mapping, None where the verdict is settled or nothing is advised."""
         table = self.found.tables["gap_next_runs"]
         return table.iloc[0].to_dict() if len(table) and self.found.verdict["probability"] < SURE else None
 
 
 def ambiguous(verdicts, most):
-    """Names of up to so many robots, in order, whose cause is hidden and whose verdict is unsure beside rivals.
+    """Names of up to `most` robots of the check label, in order, with an uncertain verdict and rival causes.
 
-    verdicts: rows of `withheld_verdicts`. Advice tells of rivals also where none is probable enough for a name.
+    verdicts: rows of `withheld_verdicts`. An advised run shows that there are rivals, even if none is probable enough
+    to be named.
     """
     rivals = (verdicts["next_runs"] != "") | (verdicts["confusable_with"] != "")
     which = (verdicts["check"] == "label") & (verdicts["probability"] < SURE) & rivals
@@ -63,30 +64,30 @@ def follow(robot, measurements, conditions, known, library):
     before = Arm(measurements, (), diagnose(measurements, known, library, details=False))
     arms, points, result = dict.fromkeys(ARMS, before), 0, []
     first = before.advised
-    told = {
+    before_columns = {
         "robot": robot.name,
         "truth": robot.truth,
         "kind": first["kind"] if first else "nothing",
-        **_told("before", before.found, robot),
+        **_verdict_columns("before", before.found, robot),
     }
     for number in range(1, ROUNDS + 1):
         generator = stream(conditions.seed, "withheld", "advice", robot.name, str(number))
         advised = arms["advised"].advised
         points = advised["points"] if advised else points
         chosen = {"advised": advised, "random": random_run(arms["random"], points, generator)}
-        row = told | {"round": number, "gain_nats": advised["gain_nats"] if advised else np.nan}
+        row = before_columns | {"round": number, "gain_nats": advised["gain_nats"] if advised else np.nan}
         for name, run in chosen.items():
             if run:
                 longer, runs = drive(robot, arms[name], run, conditions, generator)
                 arms[name] = Arm(longer, runs, diagnose(longer, known, library, details=False))
-            row |= {f"{name}_run": run["run"] if run else "", **_told(name, arms[name].found, robot)}
+            row |= {f"{name}_run": run["run"] if run else "", **_verdict_columns(name, arms[name].found, robot)}
             row[f"settled_{name}"] = row[f"right_{name}"] and row[f"probability_{name}"] >= SURE
         result.append(row)
     return result
 
 
-def _told(when, found, robot):
-    """Verdict, its probability and whether it is right, as columns of a time."""
+def _verdict_columns(when, found, robot):
+    """Verdict, its probability and whether it is correct, as columns with the suffix `when`."""
     return {
         f"verdict_{when}": found.verdict["effects"],
         f"probability_{when}": found.verdict["probability"],
@@ -95,9 +96,9 @@ def _told(when, found, robot):
 
 
 def random_run(arm, points, generator):
-    """One of the runs that the advice could choose from, of so many points or as near to that as any; 0: any.
+    """A random candidate run of the advice with the nearest number of points; points 0: any run.
 
-    None where the verdict of the Arm is sure.
+    None where the verdict of the Arm is settled.
     """
     if arm.found.verdict["probability"] >= SURE:
         return None
@@ -108,7 +109,7 @@ def random_run(arm, points, generator):
 
 
 def drive(robot, arm, run, conditions, generator):
-    """Measurements of an Arm with a row of `gap_next_runs` driven by its Robot besides, and all runs added so far."""
+    """Measurements of an Arm with an added run from a row of `gap_next_runs`, and all runs added so far."""
     campaign = robot.campaign(conditions)
     done, poses = (*campaign.plan.runs, *arm.runs), arm.found.tables["gap_next_poses"]
     new = advised_runs(run, poses, robot.trajectories, conditions.motion)
@@ -116,7 +117,7 @@ def drive(robot, arm, run, conditions, generator):
     table, _ = replace(campaign, plan=plan, noise_mm=0.0).run()
     extra = table[table["run"] > len(done)].reset_index(drop=True)
     numbered = extra.assign(run=extra["run"] - len(done))
-    noisy = with_noise(numbered, NoiseLaw(**robot.noise), conditions.noise_mm, generator).assign(run=extra["run"])
+    noisy = with_noise(numbered, NoiseModel(**robot.noise), conditions.noise_mm, generator).assign(run=extra["run"])
     return pd.concat([arm.measurements, noisy], ignore_index=True), (*arm.runs, *new)
 
 
@@ -124,9 +125,9 @@ def advice_summary(followed):
     """Frame `withheld_advice_summary` from `withheld_advice`."""
     result = []
     for number in range(1, ROUNDS + 1):
-        own = followed[followed["round"] == number]
+        in_round = followed[followed["round"] == number]
         for group, which in _GROUPS.items():
-            robots = own.query(which) if which else own
+            robots = in_round.query(which) if which else in_round
             for arm in ARMS:
                 settled, count = int(robots[f"settled_{arm}"].sum()), len(robots)
                 low, high = wilson(settled, count)

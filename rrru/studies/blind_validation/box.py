@@ -1,4 +1,4 @@
-"""Trajectories in the box about a robot's home that it is driven in. Lengths mm."""
+"""Random trajectories in a box about a robot's home. Lengths mm."""
 
 import numpy as np
 
@@ -34,7 +34,7 @@ def draw_trajectories(generator, conditions):
                 "start_deg": begin,
             },
         }
-        points = np.concatenate([one.curve(np.linspace(0.0, 1.0, 60)) for one in from_config(section)])
+        points = np.concatenate([curve.curve(np.linspace(0.0, 1.0, 60)) for curve in from_config(section)])
         if conditions.mechanism.solve(conditions.mechanism.inverse(points), points).closed.all():
             return section
     raise UnreachableError(f"{conditions.name}: no trajectories in reach within {half:g} mm of home in {_TRIES} draws")

@@ -1,4 +1,4 @@
-"""Statements on single causes and the truth about them: what acts, and which causes and groups verdicts name."""
+"""Statements on single causes compared with the truth: acting causes, and causes and groups that verdicts name."""
 
 import pandas as pd
 
@@ -9,7 +9,7 @@ from rrru.studies.blind_validation.stated import BETWEEN
 def causes_of(stated, robot):
     """Frame `withheld_causes` of a robot, without the check, from its rows of `withheld_stated`.
 
-    Errors of all axes that the robot has by itself act as any other cause.
+    The axis errors of the background count as an acting cause.
     """
     strengths = {one.effect: one.strength for one in robot.causes if not one.outside}
     strength = stated["effect"].map(strengths).fillna(0.0).astype(float)
@@ -27,9 +27,9 @@ def groups_of(stated):
 
 
 def named_lines(causes):
-    """Causes and groups that verdicts name, from `withheld_causes`: a row each, with its size and whether it is there.
+    """Causes and groups that verdicts name, from `withheld_causes`, one row each, with its size and whether it acts.
 
-    A group is there where one of its members acts.
+    A group acts where one of its members acts.
     """
     chosen = causes[causes["decision"].isin([NAMED, GROUPED])]
     line = chosen["group"].where(chosen["decision"] == GROUPED, chosen["effect"])
@@ -41,7 +41,7 @@ def named_lines(causes):
 def with_decisions(parts, causes):
     """Rows of `withheld_parts` with how the verdict names each: alone, or in a group of two or of any size.
 
-    `named` holds for the first member of a group too, which stands for it in a verdict's effects.
+    `named` holds for the first member of a group too: it represents the group in a verdict's effects.
     """
     columns = ["robot", "effect", "decision", "group"]
     about = causes[columns].rename(columns={"effect": "part"})

@@ -1,4 +1,4 @@
-"""The robots of the check on withheld effects in chunks: jobs of little memory, however many they are."""
+"""The robots of the check on withheld effects in chunks, so that a job's memory does not grow with their number."""
 
 from pathlib import Path
 from typing import NamedTuple
@@ -11,16 +11,16 @@ from rrru.studies.blind_validation.models import MODELS
 from rrru.studies.blind_validation.noise import NOISES
 from rrru.studies.blind_validation.verdicts import AS_ROBOTS_ARE, PLANTS
 
-# what is done with own robots whose pages and files are judged
+# checks on own robots whose pages and files are judged
 PAGES, MISTAKES, RIGHT = "pages", "mistakes", "right_files"
-# so many kinds of causes further on every next file begins
+# each file starts this many kinds of causes after the one before
 _APART = 4
 
 
 class Member(NamedTuple):
-    """One robot: check (label, effect, noise, many, background, as_robots_are, or a plant), what it is about, number.
+    """One robot: check (label, effect, noise, many, background, as_robots_are, or a plant), subject, number.
 
-    about: the effect that the diagnosis has to do without, the noise, the robot's entry in `robots:`, or nothing.
+    about: the effect removed from the library of the diagnosis, the noise, the robot's entry in `robots:`, or nothing.
     """
 
     check: str
@@ -34,7 +34,7 @@ class Member(NamedTuple):
 
     @property
     def taken_out(self):
-        """The effect that the diagnosis has to do without, empty for none."""
+        """The effect removed from the library of the diagnosis, empty for none."""
         return self.about if self.check == "effect" else ""
 
     @property
@@ -44,7 +44,7 @@ class Member(NamedTuple):
 
 
 def noise_of(name):
-    """The noise that a robot of that check has by its name, empty for other robots."""
+    """The noise of a robot of the check noise, from the robot's name; empty for other robots."""
     check, _, about = name.partition("_")
     return about.rpartition("_")[0] if check == "noise" else ""
 
@@ -90,7 +90,7 @@ def _of_file(plant, files, k):
 
 
 def described(config, members, as_measured=False):
-    """What is known of the robots of files among Members, by the file's entry: robot and masses.
+    """Known robot and masses of the robots of files among Members, by the file's entry.
 
     as_measured: also the reflectors whose places are known.
     """
@@ -103,7 +103,7 @@ def described(config, members, as_measured=False):
 
 
 def rivalled(section):
-    """Names of the robots on which other ways are tried by the name of their chunk: the first of the check label."""
+    """Names of the robots for the comparison of methods by the name of their chunk: the first of the check label."""
     found = {}
     for chunk, members in chunks(section).items():
         names = [one.name for one in members if one.check == "label" and one.number < section["methods"]]
@@ -121,7 +121,7 @@ def check(config):
         for name in section[key]:
             if name not in known:
                 raise ConfigError(f"withheld.{key} has {name!r}; known: {', '.join(known)}")
-    for key, name in [(of, name) for of in ("files", "as_robots_are_files") for name in section[of]]:
+    for key, name in [(k, name) for k in ("files", "as_robots_are_files") for name in section[k]]:
         file = parts.entry(config, "robots", name, f"withheld.{key}").get("mjcf", "")
         if Path(file).stem not in MODELS:
             known = ", ".join(f"{model}.xml" for model in MODELS)

@@ -1,8 +1,8 @@
 """Virtual robots whose cause of the gap is drawn and then withheld from the diagnosis. Lengths mm, angles rad, times s.
 
-An effect's strength is its gap after the calibration, rms distance without noise, over the rms distance of the noise.
-It is drawn and the effect's coordinates are scaled to it by simulating the robot: the scale from the first-order model,
-then two simulations.
+The strength of an effect is the rms distance of its gap after the calibration, without noise, over that of the noise.
+The strength is drawn, and the effect's coordinates are scaled to it: first with the first-order model, then with two
+simulations of the robot.
 """
 
 from dataclasses import asdict, replace
@@ -13,18 +13,18 @@ from rrru.campaign.trajectories import from_config
 from rrru.errors import UnreachableError
 from rrru.kinematics import singularity
 from rrru.seeds import stream
-from rrru.studies.blind_validation.noise import NOISES, NoiseLaw
+from rrru.studies.blind_validation.noise import NOISES, NoiseModel
 from rrru.studies.blind_validation.outside import CAUSES, EFFECTS, OUTSIDE
 from rrru.studies.blind_validation.robots import PASSES, Acting, Robot, true_gap_mm
 from rrru.studies.blind_validation.verdicts import AS_ROBOTS_ARE
 
 TRUTHS = {"none": 0.15, "one": 0.55, "two": 0.2, "outside": 0.1}
 WEAKEST, STRONGEST, CLEAR, SEEN = 0.1, 10.0, 2.0, 1.5
-# of many causes at once: strengths, and scatter over the noise
+# for many causes at once: interval of strengths, and largest non-repeatability over noise
 MANY, MOST_SCATTER = (0.3, 30.0), 5.0
-# of robots as they are: causes at once, and of so many robots one has a cause from outside besides
+# for robots as they are: most causes at once; one in this many robots also has a cause from outside the library
 MOST_CAUSES, OUTSIDE_EVERY = 6, 3
-# axes of joints as they are built, 1 sigma
+# errors of joint axes as manufactured, 1 sigma
 AXES_SD = {"mm": 0.01, "rad": 5e-5}
 _ANGLE_SD_RAD, _LENGTH_SD_MM = 0.002, 0.5
 _SAFE = 0.1
@@ -61,14 +61,14 @@ def _with_causes(robot, names, span, generator, conditions):
     for _ in range(_DRAWS):
         acting = tuple(draw_acting(robot, name, len(names) == 1, span, generator, conditions) for name in names)
         drawn = replace(robot, acting=acting)
-        # several causes may lose a pose together that none loses alone
+        # several causes together may lose a pose that none of them loses alone
         if true_gap_mm(drawn, conditions) is not None:
             return drawn
     raise UnreachableError(f"{robot.name}: {' and '.join(names)} lose a pose in {_DRAWS} draws")
 
 
 def _draw_single(member, conditions):
-    """A robot with one effect alone, strong enough to be seen."""
+    """A robot with a single effect, strong enough to be detected."""
     generator = stream(conditions.seed, "withheld", member.about, member.number)
     robot = bare(member.name, generator, conditions.mechanism)
     acting = draw_acting(robot, member.about, True, (CLEAR, STRONGEST), generator, conditions)
@@ -76,7 +76,7 @@ def _draw_single(member, conditions):
 
 
 def _draw_noisy(member, conditions):
-    """A robot whose noise is not what is stated, every other one with one effect."""
+    """A robot with noise that is not as stated, every second one with one effect."""
     generator = stream(conditions.seed, "withheld", member.check, member.about, member.number)
     robot = replace(bare(member.name, generator, conditions.mechanism), noise=_changed(NOISES[member.about]))
     if member.number % 2 == 0:
@@ -85,7 +85,7 @@ def _draw_noisy(member, conditions):
 
 
 def _draw_many(member, conditions):
-    """A robot with axis errors, scatter and three to six effects, every other one with a cause from outside besides."""
+    """A robot with axis errors, scatter and three to six effects; half of them also have a cause from outside."""
     generator = stream(conditions.seed, "withheld", member.check, member.number)
     robot = with_background(bare(member.name, generator, conditions.mechanism), generator, conditions)
     names = generator.choice(list(EFFECTS), int(generator.integers(3, 7)), replace=False).tolist()
@@ -96,7 +96,7 @@ def _draw_many(member, conditions):
 
 
 def _draw_background(member, conditions):
-    """A robot with axis errors, every other one with one effect besides."""
+    """A robot with axis errors, every second one with one effect as well."""
     generator = stream(conditions.seed, "withheld", member.check, member.number)
     robot = with_background(bare(member.name, generator, conditions.mechanism), generator, conditions)
     if member.number % 2 == 0:
@@ -107,7 +107,7 @@ def _draw_background(member, conditions):
 def _draw_as_robots_are(member, conditions):
     """A robot with axis errors, scatter, noise that is not as stated and one to six effects.
 
-    Every third one has a cause from outside besides.
+    Every third one also has a cause from outside the library.
     """
     generator = stream(conditions.seed, "withheld", member.check, member.number)
     robot = with_background(bare(member.name, generator, conditions.mechanism), generator, conditions)
@@ -124,34 +124,34 @@ def count_of_causes(generator):
 
 
 def has_outside(number):
-    """Whether the robot of a number has a cause from outside besides, as a third of them do."""
+    """Whether the robot of a number also has a cause from outside the library, as a third of them do."""
     return number % OUTSIDE_EVERY == 1
 
 
 def noise_not_as_stated(generator):
-    """Fields of the NoiseLaw of a robot as robots are: one of NOISES, and scatter."""
-    law = NOISES[str(generator.choice(list(NOISES)))]
-    # scatter that the law has by itself stays
-    return {"scatter": float(generator.uniform(0.0, MOST_SCATTER))} | _changed(law)
+    """Fields of the NoiseModel of a robot as robots are: one of NOISES, and scatter."""
+    noise = NOISES[str(generator.choice(list(NOISES)))]
+    # scatter that the noise model defines takes precedence
+    return {"scatter": float(generator.uniform(0.0, MOST_SCATTER))} | _changed(noise)
 
 
 def with_background(robot, generator, conditions):
     """The robot with ordinary errors of the axes of all its joints."""
-    law = CAUSES["joint_axis_error"]
-    size = [AXES_SD[unit] for unit in law.parameters.units]
-    acting = Acting(law.name, {}, tuple((size * generator.standard_normal(len(size))).tolist()), 0, 0.0)
+    effect = CAUSES["joint_axis_error"]
+    size = [AXES_SD[unit] for unit in effect.parameters.units]
+    acting = Acting(effect.name, {}, tuple((size * generator.standard_normal(len(size))).tolist()), 0, 0.0)
     gap = true_gap_mm(replace(robot, background=(acting,)), conditions)
     return replace(robot, background=(replace(acting, strength=float(gap / conditions.noise_rms_mm)),))
 
 
-def _changed(law):
-    """The fields of a NoiseLaw that are not as stated."""
-    changed = {key: value for key, value in asdict(law).items() if value != getattr(NoiseLaw(), key)}
+def _changed(noise):
+    """The fields of a NoiseModel that are not as stated."""
+    changed = {key: value for key, value in asdict(noise).items() if value != getattr(NoiseModel(), key)}
     return {key: list(value) if isinstance(value, tuple) else value for key, value in changed.items()}
 
 
 def bare(name, generator, mechanism):
-    """A robot with its campaign and deviations drawn, and nothing acting."""
+    """A robot with random campaign and deviations, and no acting cause."""
     parameters = mechanism.parameters
     size = [_ANGLE_SD_RAD if unit == "rad" else _LENGTH_SD_MM for unit in parameters.units]
     inside = parameters.inside(size * generator.standard_normal(len(size)))
@@ -191,13 +191,14 @@ def _safe(section, mechanism):
     points = np.concatenate([trajectory.curve(np.linspace(0.0, 1.0, 100)) for trajectory in from_config(section)])
     theta = mechanism.inverse(points)
     measures = (singularity.translational_measure, singularity.constraint_measure)
-    return bool(np.isfinite(theta).all() and min(of(mechanism, points, theta).min() for of in measures) > _SAFE)
+    smallest = min(measure(mechanism, points, theta).min() for measure in measures)
+    return bool(np.isfinite(theta).all() and smallest > _SAFE)
 
 
 def draw_acting(robot, name, single, span, generator, conditions):
-    """A cause of a strength drawn log-uniform from a span; single: it may sit on one leg alone, as a third of them do.
+    """A cause of a strength drawn log-uniform from a span; single: a third of the causes act on one leg alone.
 
-    Draws that would break a bound or lose a pose are made again, the strength only where no draw can have it.
+    Draws that violate a bound or lose a pose are repeated, first with the same strength, then with another one.
     """
     coordinates = CAUSES[name].coordinates
     for _ in range(_DRAWS):
@@ -211,7 +212,7 @@ def draw_acting(robot, name, single, span, generator, conditions):
 
 
 def draw_direction(name, coordinates, single, strength, generator):
-    """A cause with its shape, legs and the ratios of its coordinates drawn, not yet of that strength."""
+    """A cause with random shape, legs and ratios of its coordinates, not yet scaled to its strength."""
     sizes = coordinates.typical * generator.standard_normal(len(coordinates))
     sizes = np.where(coordinates.positive, np.abs(sizes), sizes)
     shape = {key: _draw_value([shape[key] for shape in coordinates.shapes], generator) for key in coordinates.shapes[0]}
@@ -223,7 +224,7 @@ def draw_direction(name, coordinates, single, strength, generator):
 
 
 def _draw_value(tried, generator):
-    """A value of a shape: one of two that the library tries, else between the least and the largest that it tries."""
+    """A value of a shape: one of at most two grid values of the library, else between its smallest and largest one."""
     known = sorted({float(value) for value in tried})
     low, high = known[0], known[-1]
     if len(known) <= 2:
@@ -234,7 +235,7 @@ def _draw_value(tried, generator):
 
 
 def _to_strength(robot, acting, conditions):
-    """The cause scaled to its strength, or None where that breaks its bounds or loses a pose."""
+    """The cause scaled to its strength, or None where that violates its bounds or loses a pose."""
     robot = replace(robot, background=())
     gap, asked = _first_order_gap_mm(robot, acting, conditions), acting.strength * conditions.noise_rms_mm
     for _ in range(3):
@@ -246,12 +247,12 @@ def _to_strength(robot, acting, conditions):
 
 
 def _first_order_gap_mm(robot, acting, conditions):
-    """Rms distance that the calibration would leave of a cause, to first order."""
+    """Rms residual distance of a cause after the calibration, to first order."""
     mechanism = conditions.mechanism
     campaign = robot.campaign(conditions)
     motion = campaign.robot.motion(campaign.plan, mechanism.inverse)
     at = mechanism.map_at(motion.drive, motion.position_mm)
-    moved = at.move(acting.law.contribute(motion, acting.values).twists).ravel()
+    moved = at.move(acting.effect_model.contribute(motion, acting.values).twists).ravel()
     base = at.columns(mechanism.directions).reshape(moved.size, -1)
     basis, _ = np.linalg.qr(base)
     return float(np.sqrt(((moved - basis @ (basis.T @ moved)) ** 2).sum() / len(motion)))

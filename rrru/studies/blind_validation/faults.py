@@ -1,10 +1,10 @@
-"""Causes as an engineer names them, each with the answer that is right. Lengths mm, angles rad, times s.
+"""Causes as an engineer names them, each with the correct answer. Lengths mm, angles rad, times s.
 
-Play, soft or slow servos, soft links, clearance and warming have a law in the library. A base that is not level and a
-load that nobody told of only change the weight: they show where the servos are soft, so that the drives' compliance is
-the answer (were the tracker level and the base not, that would be a matter of the frame). One leg's length and a tilted
-axis are numbers of a full calibration, no cause. A base on springs is a pedestal that turns and does not shift.
-Friction that grows with the square of the speed has no law of those that are tried.
+The library has effect models of backlash, soft or slow servos, soft links, clearance and warming. A tilted base and an
+unknown payload change only the gravity load. They reveal soft servos, so the drives' compliance is the correct answer.
+(If the tracker were level and the base not, the frame would be the cause.) The length of one leg and a tilted axis are
+parameters of a full calibration, not causes. A base on springs is a pedestal that rotates and does not translate. No
+effect model of the library holds friction that grows with the square of the speed.
 """
 
 from collections.abc import Callable
@@ -39,22 +39,22 @@ def _speed_friction(robot):
 
 
 def _leaning_base(robot):
-    """The base turns about its two level axes under the moment of all weight."""
-    law = find("pedestal_compliance", robot)
-    # it turns, and does not shift besides
-    most = law.coordinates.typical * [1.0, 1.0, 0.0, 0.0]
-    positive = np.ones(len(most), dtype=bool)
-    return replace(law, coordinates=replace(law.coordinates, typical=most, positive=positive))
+    """The base rotates about its two horizontal axes under the moment of the whole weight."""
+    effect = find("pedestal_compliance", robot)
+    # the base rotates and does not translate
+    typical = effect.coordinates.typical * [1.0, 1.0, 0.0, 0.0]
+    positive = np.ones(len(typical), dtype=bool)
+    return replace(effect, coordinates=replace(effect.coordinates, typical=typical, positive=positive))
 
 
 @dataclass(frozen=True)
 class Kind:
     """A kind of cause.
 
-    law: from a robot to the Effect that it is on our own plant, None where it is errors of the robot's own numbers;
-    answer: the effect that is right, empty where the calibration takes it up, None where the library has no law of it;
-    on: field of a Model that lists where it acts, empty for drives and the whole robot; typical: sizes of such errors;
-    more: further numbers by name, each with the span that it is drawn from.
+    law: makes the Effect on our own plant from a robot, None where the cause is errors of geometric parameters;
+    answer: name of the correct effect, empty where the calibration absorbs the cause, None where the library has no
+    effect model of it; on: field of a Model that lists where it acts, empty for drives and the whole robot;
+    typical: s.d. of such errors; more: further numbers by name, each with the interval that it is drawn from.
     """
 
     law: Callable | None
@@ -65,7 +65,7 @@ class Kind:
 
 
 def _named(name, on="", **more):
-    """A kind that the library has a law for."""
+    """A kind for which the library has an effect model."""
     return Kind(partial(find, name), name, on, more=more)
 
 
@@ -84,18 +84,18 @@ KINDS = {
     "base_on_springs": Kind(_leaning_base, "pedestal_compliance"),
     "speed_friction": Kind(_speed_friction, None),
 }
-# causes from outside that act in a robot of any kind, by the name of their kind
+# causes outside the library that can act in every robot, by the name of their kind
 OUTSIDE_OF_ANY = ("speed_friction", "tripod_sway", "tracker_bump")
 
 
 def kind_of(name):
-    """The Kind of a name in KINDS, of a cause from outside in `OUTSIDE`, or of an effect of the library."""
+    """The Kind of a name in KINDS, of a cause in `OUTSIDE`, or of an effect of the library."""
     if name in OUTSIDE:
         return Kind(lambda _: OUTSIDE[name], None)
     return KINDS[name] if name in KINDS else _named(name)
 
 
-# what is given to the robots of one model, one after the other
+# the robots of one model get these in turn
 ORDER = (
     *("play", NONE, "soft_servo", "base_on_springs", "slow_servo", "length", NONE, "soft_link", "speed_friction"),
     *("clearance", "soft_servo_on_a_slope", NONE, "warming", "tilted_axis", "soft_servo_under_a_load"),
@@ -104,8 +104,10 @@ ORDER = (
 
 @dataclass(frozen=True)
 class Fault:
-    """A cause that acts: kind, sizes (c,) in the coordinates of its law or of the Model's list, further numbers by
-    name; leg: number of the one place that it is at, or 0; strength: gap over noise.
+    """A cause that acts.
+
+    sizes: (c,) in the coordinates of its effect model, or errors of the Model's list; more: further numbers by name;
+    leg: number of the single place where it acts, or 0; strength: gap over noise.
     """
 
     kind: str
@@ -116,50 +118,50 @@ class Fault:
 
     @classmethod
     def from_mapping(cls, section):
-        """The fault of its fields, as JSON holds them."""
+        """The fault from its JSON fields."""
         return cls(**(section | {"sizes": tuple(section["sizes"])}))
 
     @property
     def effect(self):
-        """Its name as a part of a gap, empty where it makes none."""
+        """Its name as a part of a gap, empty where it makes no gap."""
         return self.kind if self.outside else kind_of(self.kind).answer
 
     @property
     def outside(self):
-        """Whether no law of the library holds it."""
+        """Whether the library has no effect model of it."""
         return kind_of(self.kind).answer is None
 
     @property
     def truth(self):
-        """The right answer in words."""
+        """The correct answer in words."""
         return f"{PREFIX}:{self.kind}" if self.outside else kind_of(self.kind).answer or NONE
 
     def scaled(self, factor):
-        """The same fault, so many times as large."""
+        """The same fault with its sizes multiplied by a factor."""
         return replace(self, sizes=tuple((factor * np.array(self.sizes)).tolist()))
 
     def moves(self, robot):
-        """Whether it shows only while the robot moves; all others are read at rest."""
-        law = kind_of(self.kind).law
-        return bool(law and "drive_rate" in law(robot).needs)
+        """Whether it shows only while the robot moves; all others are measured at rest."""
+        make_effect = kind_of(self.kind).law
+        return bool(make_effect and "drive_rate" in make_effect(robot).needs)
 
     def beyond(self, robot):
-        """Whether it is larger than the law of the library allows that is the right answer."""
+        """Whether it exceeds the bounds of the effect model that is the correct answer."""
         kind = kind_of(self.kind)
         return bool(kind.law and kind.answer and (np.abs(self.sizes) > kind.law(robot).coordinates.most).any())
 
     def values(self, robot):
-        """Its Effect on a robot, and the law's parameter values by name."""
-        law = kind_of(self.kind).law(robot)
-        shape = {name: self.more.get(name, value) for name, value in law.coordinates.shapes[0].items()}
-        return law, law.parameters.mapping(law.coordinates.to_values(np.array(self.sizes), shape))
+        """Its Effect on a robot, and the effect's parameter values by name."""
+        effect = kind_of(self.kind).law(robot)
+        shape = {name: self.more.get(name, value) for name, value in effect.coordinates.shapes[0].items()}
+        return effect, effect.parameters.mapping(effect.coordinates.to_values(np.array(self.sizes), shape))
 
     def numbers(self, robot):
-        """True values of the library's parameters by effect and name, as far as the fault is these."""
+        """True values of the library's parameters by effect and name; empty where the fault has no such values."""
         if not (kind_of(self.kind).law and kind_of(self.kind).answer) or "load_kg" in self.more:
             return {}
-        law, values = self.values(robot)
-        return {law.name: values}
+        effect, values = self.values(robot)
+        return {effect.name: values}
 
 
 def kinds_of(model, robot):
@@ -168,12 +170,12 @@ def kinds_of(model, robot):
 
 
 def _fits(kind, model, robot):
-    """Whether a robot has a place for a kind, and its library a law."""
+    """Whether a robot has a place for a kind, and its library an effect model."""
     return (not kind.on or len(getattr(model, kind.on)) > 0) and (not kind.law or kind.law(robot) is not None)
 
 
 def draw_fault(name, model, robot, generator):
-    """A fault of a kind with the ratios of its sizes drawn; of a third of those with several places one alone."""
+    """A fault of a kind with random ratios of its sizes; a third of those with several places act at one only."""
     kind = KINDS[name]
     if kind.law:
         coordinates = kind.law(robot).coordinates

@@ -1,4 +1,4 @@
-"""Campaigns of another simulator, whose answers the user knows, scored as the check's own robots are."""
+"""Campaigns of another simulator with answers from the user, scored like the check's own robots."""
 
 import numpy as np
 import pandas as pd
@@ -19,10 +19,10 @@ def score_field(verdicts, answers):
     truth = answers.assign(effects=answers["effects"].map(in_order))
     truth = truth.rename(columns={"campaign": "robot", "effects": "truth", "leg": "truth_leg"})
     strength = verdicts["gap_rms_mm"] / verdicts["noise_rms_mm"]
-    told = verdicts.assign(strength=strength, oracle_detects=False, share_closed_true=np.nan).merge(truth, on="robot")
-    told = told.assign(file="", cause=told["truth"], numbers=0, held=0)
-    right = [is_right(*pair, "field") for pair in zip(told["truth"], told["effects"], strict=True)]
-    return scores(told.assign(right=right))
+    joined = verdicts.assign(strength=strength, oracle_detects=False, share_closed_true=np.nan).merge(truth, on="robot")
+    joined = joined.assign(file="", cause=joined["truth"], numbers=0, held=0)
+    right = [is_right(*pair, "field") for pair in zip(joined["truth"], joined["effects"], strict=True)]
+    return scores(joined.assign(right=right))
 
 
 def read_field_answers(path):

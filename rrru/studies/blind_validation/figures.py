@@ -1,4 +1,4 @@
-"""How good the diagnosis is where the answer was withheld from it."""
+"""Figures of the diagnosis' performance where the answer was withheld from it."""
 
 import numpy as np
 from matplotlib.colors import PowerNorm
@@ -27,18 +27,18 @@ _PARTED = ("many", "noise", AS_ROBOTS_ARE)
 _KINDS = {
     "effect": ("an effect", {"color": style.BLUE, "marker": "s"}),
     "background": ("axis errors", {"color": style.GREY, "marker": "P"}),
-    "scatter": ("scatter", {"color": style.ORANGE, "marker": "^"}),
-    "runs": ("offsets of runs", {"color": style.VERMILION, "marker": "D"}),
+    "scatter": ("non-repeatability", {"color": style.ORANGE, "marker": "^"}),
+    "runs": ("offsets per run", {"color": style.VERMILION, "marker": "D"}),
     "unexplained": ("unexplained", {"color": style.BLACK, "marker": "o"}),
 }
 # parts below this (mm) are drawn on the edge
 _LEAST_MM = 0.003
 _STRENGTH_EDGES = np.array([0.1, 0.3, 0.6, 1.0, 1.5, 3.0, 6.0, 12.0, 25.0, 50.0, 100.0])
 _NO_GAP = 0.01
-# panels of reliability in a row, and its height; above the shares numbers of statements in bins, their sum, the edge
+# panels per row and row height; heights of the counts per bin, of their sum, and of the upper edge
 _PER_LINE, _LINE_MM = 3, 72.0
 _COUNTS_AT, _ERROR_AT, _TOP = 1.08, 1.36, 1.52
-# shares closed below this are drawn on the edge
+# explained fractions below this are drawn on the edge
 _LOWEST_CLOSED = -0.2
 _EVEN = {"color": style.GREY, "linewidth": 0.8, "linestyle": (0, (4, 2)), "zorder": 1}
 _FRAME = {"facecolor": "none", "edgecolor": style.ORANGE, "linewidth": 0.9}
@@ -47,32 +47,32 @@ _ORACLE = {"color": style.BLACK, "marker": "o", "markerfacecolor": "white", "lin
 
 @style.printed
 def withheld_plants(tables, options):
-    """Robots of files with the same causes, driven by MuJoCo and by our own plant, whose laws are those of the
-    diagnosis; as the figure of the other checks: confusion tables, then the share of right verdicts against the gap
-    over the noise, and the share of the gap closed as predicted and in truth. Last the parts of the gaps, found against
-    true, filled where the verdict names them.
+    """Robots of files with the same causes, simulated by MuJoCo and by our own plant with the effect models of the
+    diagnosis. Confusion tables; share of correct verdicts against the gap over the noise; explained fraction of the gap
+    as predicted against its true value. Last the parts of the gaps, found against true, filled where the verdict names
+    them.
     """
     return _check(tables, PLANTS, PLANTS)
 
 
 @style.printed
 def withheld(tables, options):
-    """The diagnosis where the answer was withheld. Confusion tables: counts, shaded by their share of the row,
-    right answers framed; of the effect check, the row is the effect that was taken out of the library. Unexplained
-    counts alone or together with a name. Then the share of right verdicts against the gap over the noise, and of a test
-    that knows the true law (1 % false alarms), with 95 % intervals, and the share of the gap closed as predicted and in
-    truth. Last the parts of gaps that many causes make, or noises that are not as stated: found against true, filled
-    where the verdict names them (scatter and runs: where they are more probable than not), 25 % off between the dotted
-    lines, missed parts and parts that are not there on the edges.
+    """The diagnosis where the answer was withheld. Confusion tables: counts, shaded by their share of the row, correct
+    answers framed. For the effect check, the row is the effect that was removed from the library. Unexplained counts
+    alone or together with a name. Then the share of correct verdicts against the gap over the noise, and that of a test
+    with the true effect model (1 % false alarms), with 95 % intervals. Next to it the explained fraction of the gap as
+    predicted against its true value. Last the parts of gaps with many causes or with noise that is not as stated: found
+    against true, filled where the verdict names them (non-repeatability and offsets per run: where their probability
+    exceeds 0.5). The dotted lines mark errors of 25 %; missed and false parts lie on the edges.
     """
     return _check(tables, [name for name in _CHECKS if name not in PLANTS], _PARTED)
 
 
 @style.printed
 def withheld_causes(tables, options):
-    """How often causes act that have a stated probability: a reliability diagram of each check, with 95 % intervals.
-    Above it the number of statements in each bin, their sum and the expected calibration error. A statement is one on a
-    single cause of a robot, named or not; those on causes that make less than half of the noise are left out.
+    """Reliability diagram of each check: how often causes act that have a stated probability, with 95 % intervals.
+    Above it the number of statements in each bin, their sum and the expected calibration error. Each statement is about
+    a single cause of a robot, named or not. Causes with a gap below half of the noise are left out.
     """
     stated = {name: counted(tables["withheld_causes"].query("check == @name")) for name in _CHECKS}
     stated = {name: causes for name, causes in stated.items() if len(causes)}
@@ -90,7 +90,7 @@ def withheld_causes(tables, options):
 
 
 def _check(tables, checks, parted):
-    """The figure of some checks, and below it parts of the gaps of some."""
+    """The figure of the checks, with the parts of the gaps of the checks in `parted` below."""
     scores, confusion = tables["withheld_scores"], tables["withheld_confusion"]
     checks = [name for name in checks if (scores["check"] == name).any()]
     if not checks:
@@ -131,7 +131,7 @@ def _truth(truth, check):
 
 
 def _verdict(verdict):
-    """The column of a verdict; what says unexplained counts as that, whatever it names besides."""
+    """The column of a verdict; a verdict with unexplained counts as that, whatever else it names."""
     names = verdict.split("+")
     return UNEXPLAINED if UNEXPLAINED in names else SEVERAL if len(names) > 1 else verdict
 
@@ -150,7 +150,7 @@ def _map(cells, names):
 
 
 def _confusion(axes, counts, withheld_effect):
-    """Confusion table as a heat map of each row's shares, counts written; the right answers are framed."""
+    """Confusion table as a heat map of each row's shares, with counts; the correct answers are framed."""
     table, rows, columns = counts.to_numpy(), list(counts.index), list(counts.columns)
     share = table / np.maximum(table.sum(axis=1, keepdims=True), 1)
     axes.imshow(share, cmap=style.SEQUENTIAL, norm=PowerNorm(0.6, 0.0, 1.0), aspect="auto", interpolation="none")
@@ -171,7 +171,7 @@ def _confusion(axes, counts, withheld_effect):
 
 
 def _reliability(axes, causes, look):
-    """How often causes act against the stated probability that they do, with the number of statements in each bin."""
+    """How often causes act against their stated probability, with the number of statements in each bin."""
     axes.plot([0.0, 1.0], [0.0, 1.0], **_EVEN)
     _shares(axes, causes.assign(acts=causes["acts"].astype(bool)), ("probability", "acts"), BIN_EDGES, None, look)
     number, _ = np.histogram(causes["probability"], BIN_EDGES)
@@ -187,23 +187,26 @@ def _reliability(axes, causes, look):
 
 
 def _strength(axes, scores, checks):
-    """How often the diagnosis is right, and whether the effect could be seen at all, against the gap over the noise."""
-    # what a calibration takes up leaves no gap
+    """Shares of correct verdicts and of detectable effects against the gap over the noise."""
+    # a cause that the calibration absorbs leaves no gap
     scores = scores[scores["strength"] > _NO_GAP]
     for name in checks:
         _shares(axes, scores[scores["check"] == name], ("strength", "right"), _STRENGTH_EDGES, *_CHECKS[name])
     if checks[0] != "field":
-        # of a field campaign nobody knows the law
-        rows, label = scores[scores["check"] == checks[0]], f"detected by the true law, {_CHECKS[checks[0]][0]}"
+        # the true effect model of a field campaign is not known
+        rows, label = (
+            scores[scores["check"] == checks[0]],
+            f"detected with the true effect model, {_CHECKS[checks[0]][0]}",
+        )
         _shares(axes, rows, ("strength", "oracle_detects"), _STRENGTH_EDGES, label, _ORACLE)
     axes.set(xscale="log", xlabel="gap over noise, rms", ylabel="share of robots", ylim=(-0.03, 1.03))
     axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 3.0)))
     style.plain_log(axes.xaxis)
-    axes.set_title("right, by strength of the gap")
+    axes.set_title("correct verdicts, by strength of the gap")
 
 
 def _closed(axes, scores, checks):
-    """Share of the gap closed: as the diagnosis predicts it, against the truth."""
+    """Explained fraction of the gap: predicted against true."""
     axes.plot([_LOWEST_CLOSED, 1.0], [_LOWEST_CLOSED, 1.0], **_EVEN)
     for name in checks:
         rows = scores[scores["check"] == name].dropna(subset=["share_closed", "share_closed_true"])
@@ -211,9 +214,9 @@ def _closed(axes, scores, checks):
         values = rows[["share_closed_true", "share_closed"]].clip(_LOWEST_CLOSED, 1.0).to_numpy()
         axes.plot(*values.T, label=label, **(look | {"linestyle": "none", "markersize": 2.4, "markeredgewidth": 0.5}))
     edges = (_LOWEST_CLOSED - 0.04, 1.04)
-    axes.set(xlabel="true share closed", ylabel="predicted share closed", xlim=edges, ylim=edges)
+    axes.set(xlabel="true explained fraction", ylabel="predicted explained fraction", xlim=edges, ylim=edges)
     axes.xaxis.set_major_locator(MultipleLocator(0.2))
-    axes.set_title("share of the gap closed")
+    axes.set_title("explained fraction of the gap")
 
 
 def _parts(axes, parts):

@@ -1,6 +1,6 @@
-"""Robots of files that are driven by a plant of the caller's choice: MuJoCo, or our own laws for comparison. mm, rad.
+"""Robots of files on a plant of the caller's choice: MuJoCo, or our own effect models for comparison. mm, rad.
 
-The same number is the same robot on every plant, but that each plant makes its own gap of the fault.
+A number gives the same robot on every plant. Only the gap that a fault makes depends on the plant.
 """
 
 import json
@@ -23,21 +23,21 @@ from rrru.studies import setup
 from rrru.studies.blind_validation.box import draw_trajectories
 from rrru.studies.blind_validation.faults import Fault, draw_fault, kind_of, kinds_of
 from rrru.studies.blind_validation.models import MODELS
-from rrru.studies.blind_validation.noise import NoiseLaw, with_noise
+from rrru.studies.blind_validation.noise import NoiseModel, with_noise
 from rrru.studies.blind_validation.plants import PLANTS
 from rrru.studies.blind_validation.robots import Conditions, WithheldCampaign
 from rrru.studies.blind_validation.verdicts import NONE, UNEXPLAINED
 
-# what can be seen at all, and what an own tracker would find
+# gap over noise: detectable at all, and large enough for the user's own tracker
 WEAKEST, STRONGEST = 0.7, 10.0
 OFFSET_SD = {"rad": 0.002, "mm": 0.5}
 DRAWS, _STEPS = 20, 2
-# a gap over the noise that is rounding
+# gap over noise at the level of rounding errors
 _NOTHING = 1e-6
-# so slow that inertia, of those that are read as they move, stays about a hundredth of the weight
+# slow enough that inertia stays near 1 % of the weight for robots that are measured in motion
 _MOTION = {"speed_mm_s": 40.0, "acceleration_mm_s2": 40.0, "dwell_s": 60.0}
 _PLAIN = {"reverse": False, "payload_kg": 0.0}
-# some 190 points: there and back, faster, loaded
+# about 190 points: forward and reverse, faster, with payload
 _PASSES = (
     _PLAIN,
     _PLAIN | {"reverse": True},
@@ -48,7 +48,7 @@ _PASSES = (
 
 @dataclass(frozen=True)
 class FileConditions(Conditions):
-    """What all robots of one file share: beside the rest name of its entry in `robots:`, file, and platform in it."""
+    """Conditions of all robots of one file: also name of its entry in `robots:`, file, and platform in it."""
 
     name: str
     file: str
@@ -56,30 +56,31 @@ class FileConditions(Conditions):
 
     @property
     def model(self):
-        """Where it goes, and where causes act in its file."""
+        """Its workspace, and the places in its file where causes act."""
         return MODELS[Path(self.file).stem]
 
     @classmethod
     def from_parts(cls, parts, settings):
-        """The conditions of one robot from its parts of the configuration, and what all share."""
+        """The conditions of one robot from its parts of the configuration and the settings of the check."""
         nominal, masses = parts["robot"], Masses(**parts["masses"])
-        told = {key: nominal["dimensions"][key] for key in ("mjcf", "platform")}
+        mjcf, platform = (nominal["dimensions"][key] for key in ("mjcf", "platform"))
         noise_mm, seed = settings["withheld"]["noise_mm"], settings["seed"]
         robot = setup.mechanism(nominal)
-        return cls(robot, _MOTION, masses, noise_mm, seed, nominal["name"], told["mjcf"], told["platform"])
+        return cls(robot, _MOTION, masses, noise_mm, seed, nominal["name"], mjcf, platform)
 
     def seen(self, measurements):
-        """The nominal robot with the numbers that a measurement table tells."""
+        """The nominal robot with the parameters that a measurement table observes."""
         return setup.as_measured(self.mechanism, measurements, tuple(self.model.targets))
 
 
 @dataclass(frozen=True)
 class FileRobot:
-    """A robot of a file: the file's entry in `robots:`, plant, trajectories as in the configuration, offsets of its
-    drives (K,) and errors of its other numbers if any, the faults if any.
+    """A robot of a file.
 
-    oracle_chi2: what its own displacement, the size fitted, takes off the chi-square of its measurements; noise: fields
-    of the NoiseLaw that are not as stated; rests: it is read at rest unless what acts shows in motion alone.
+    file: its entry in `robots:`; plant: in PLANTS; trajectories: as in the configuration; offsets: of its drives (K,),
+    then errors of its other parameters if any; acting: faults; oracle_chi2: reduction of the chi-square of its
+    measurements by its true displacement, the size fitted; noise: fields of the NoiseModel that are not as stated;
+    rests: it is measured at rest unless a cause shows in motion alone.
     """
 
     name: str
@@ -96,22 +97,22 @@ class FileRobot:
 
     @property
     def causes(self):
-        """All that acts."""
+        """All acting causes."""
         return self.acting
 
     @property
     def truth(self):
-        """The right answer."""
+        """The correct answer."""
         return "+".join(sorted(one.truth for one in self.acting)) or NONE
 
     @property
-    def beside(self):
-        """What may be named beside the right answer: a load that nobody told of is no law of the library."""
+    def also_allowed(self):
+        """Names allowed together with the correct answer: the library has no effect model of an unknown payload."""
         return {UNEXPLAINED} if any("load_kg" in one.more for one in self.acting) else set()
 
     @property
     def cause(self):
-        """What acts, in the plant's words."""
+        """The acting causes, as the plant names them."""
         return "+".join(sorted(one.kind for one in self.acting)) or NONE
 
     def numbers(self, conditions):
@@ -119,7 +120,7 @@ class FileRobot:
         return {name: values for one in self.acting for name, values in one.numbers(conditions.mechanism).items()}
 
     def plan(self, conditions):
-        """What it is told to do."""
+        """Its campaign plan."""
         return make_plan(from_config(self.trajectories), _PASSES, **conditions.motion)
 
     def campaign(self, conditions):
@@ -137,7 +138,7 @@ class FileRobot:
         if not self.noise:
             return campaign.run()[0]
         return with_noise(
-            noise_free(self, conditions), NoiseLaw(**self.noise), conditions.noise_mm, campaign.generator()
+            noise_free(self, conditions), NoiseModel(**self.noise), conditions.noise_mm, campaign.generator()
         )
 
     def answer(self, conditions):
@@ -156,7 +157,7 @@ class FileRobot:
 
     @classmethod
     def from_mapping(cls, section):
-        """The robot of its fields, as JSON holds them."""
+        """The robot from its JSON fields."""
         acting = tuple(map(Fault.from_mapping, section["acting"]))
         return cls(**(section | {"acting": acting, "offsets": tuple(section["offsets"])}))
 
@@ -168,16 +169,16 @@ def noise_free(robot, conditions):
 
 
 def residual(measurements, conditions):
-    """What a calibration leaves (m, 3) of a measurement table."""
+    """Residual of a calibration (m, 3) on a measurement table."""
     return calibrate(select(measurements, conditions.seen(measurements), ["*"])).residual_mm
 
 
 def draw(member, conditions):
     """The robot of a Member, see `rrru.studies.blind_validation.chunks`, and its measurements.
 
-    A fault that the plant cannot drive, because a pose is lost or nothing comes to rest, or that nobody's robot has, is
-    drawn again, and with it the trajectories; where none of its kind can be driven it is one of the next kind. Raises
-    the last of these errors where there is no such kind.
+    Fault and trajectories are drawn again where the plant loses a pose or does not come to rest, or where the fault
+    exceeds the bounds of its effect model. Where no draw of its kind succeeds the fault is of the next kind. Raises the
+    last of these errors where there is no such kind.
     """
     generator = stream(conditions.seed, "withheld", "files", conditions.name, member.number)
     offsets = [OFFSET_SD[unit] * generator.standard_normal() for unit in conditions.mechanism.parts.units]
@@ -200,9 +201,10 @@ def draw(member, conditions):
 
 
 def sized(robot, fault, strength, conditions):
-    """A fault of a strength on our own plant, where a calibration does not take it up.
+    """The fault scaled to a strength on our own plant.
 
-    Raises UnreachableError where none has that strength, or one only that is larger than the library has causes.
+    Raises UnreachableError where a calibration absorbs it, where a pose is lost, or where that strength exceeds the
+    bounds of its effect model.
     """
     if kind_of(fault.kind).law is None:
         return fault
@@ -213,20 +215,20 @@ def sized(robot, fault, strength, conditions):
             raise UnreachableError(f"{robot.name}: {fault.kind} of {fault.sizes} loses a pose")
         gap = _rms(residual(measurements, conditions) - still) / conditions.noise_rms_mm
         if not gap > _NOTHING:
-            raise UnreachableError(f"{robot.name}: a calibration takes up {fault.kind} of {fault.sizes}")
+            raise UnreachableError(f"{robot.name}: a calibration absorbs {fault.kind} of {fault.sizes}")
         fault = fault.scaled(strength / gap)
-        # far beyond its bounds it is not simulated: no calibration fits such readings
+        # far beyond its bounds no calibration fits, so that the simulation stops here
         if fault.scaled(0.5).beyond(conditions.mechanism):
             break
     if fault.beyond(conditions.mechanism):
-        raise UnreachableError(f"{robot.name}: {fault.kind} of {fault.sizes} is more than its law allows")
+        raise UnreachableError(f"{robot.name}: {fault.kind} of {fault.sizes} exceeds the bounds of its effect model")
     return fault
 
 
 def as_driven(robot, conditions):
-    """A robot with the strength that its fault truly has, and its measurements.
+    """The robot with the true strength of its fault, and its measurements.
 
-    The strength is the rms distance between what a calibration leaves with the fault and without, over the noise's.
+    The strength is the rms distance between the calibration residuals with and without the fault, over the noise rms.
     """
     campaign = robot.campaign(conditions)
     measurements, truth = campaign.run()
@@ -241,11 +243,11 @@ def as_driven(robot, conditions):
 
 
 def gap_over_noise(robot, conditions):
-    """Rms distance between what a calibration leaves of a robot with all that acts and without, over the noise's.
+    """Rms distance between the calibration residuals with and without all acting causes, over that of the noise.
 
     NaN where a pose is lost.
     """
-    driven = [noise_free(one, conditions) for one in (robot, replace(robot, acting=()))]
+    driven = [noise_free(variant, conditions) for variant in (robot, replace(robot, acting=()))]
     if any(measurements is None for measurements in driven):
         return np.nan
     acting, still = (residual(measurements, conditions) for measurements in driven)

@@ -1,4 +1,4 @@
-"""The robots of the check: 3-RRRUs of our own plant, and robots of files on the plant that they name."""
+"""The robots of the check: 3-RRRUs on our own plant, and robots of files on the plant that they name."""
 
 import json
 from typing import NamedTuple
@@ -9,7 +9,7 @@ from rrru.studies.blind_validation.verdicts import AS_ROBOTS_ARE
 
 
 class Known(NamedTuple):
-    """Conditions of all robots of one file, or of our own 3-RRRU, and effects by name that the diagnosis knew."""
+    """Conditions of all robots of one file or of our own 3-RRRU, and effects by name of the diagnosis' library."""
 
     conditions: robots.Conditions
     library: dict = EFFECTS
@@ -19,7 +19,7 @@ def all_conditions(settings):
     """Conditions by the entry in `robots:` of a file, and with an empty name that of our own 3-RRRU."""
     files = settings["files"].items()
     own = robots.Conditions.from_config(settings)
-    return {"": own} | {name: foreign.FileConditions.from_parts(told, settings) for name, told in files}
+    return {"": own} | {name: foreign.FileConditions.from_parts(parts, settings) for name, parts in files}
 
 
 def drawn(member, conditions):
@@ -39,7 +39,7 @@ def robot_of(text):
 
 
 def fresh_runs(robot, conditions):
-    """Measurements without noise of a robot on runs never driven, None where nothing acts or a pose is lost."""
+    """Noise-free measurements of a robot on new runs, None where nothing acts or a pose is lost."""
     if not robot.causes:
         return None
     if robot.file:

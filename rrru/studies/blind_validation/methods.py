@@ -1,4 +1,4 @@
-"""What the diagnosis and other ways to find a cause have said, beside the truth."""
+"""Answers of the diagnosis and of other methods compared with the truth."""
 
 import json
 
@@ -20,21 +20,21 @@ _LEAST_PROBABILITY, _STRONG = 1e-3, 1.5
 
 def compare(said, answers):
     """Frame `withheld_methods` from `withheld_beliefs` and `withheld_answers`."""
-    told = said.merge(answers, on="robot", validate="many_to_one")
-    told = told.assign(**pd.DataFrame([_scored(row) for row in told.to_dict("records")], index=told.index))
+    joined = said.merge(answers, on="robot", validate="many_to_one")
+    joined = joined.assign(**pd.DataFrame([_scored(row) for row in joined.to_dict("records")], index=joined.index))
     rows = []
-    for method, own in told.groupby("method", sort=False):
-        right = own["right"].dropna()
+    for method, answered in joined.groupby("method", sort=False):
+        right = answered["right"].dropna()
         low, high = wilson(right.sum(), len(right))
-        means = own[["probability_true", "brier", "log_score", "seconds"]].mean()
+        means = answered[["probability_true", "brier", "log_score", "seconds"]].mean()
         shares = {"right": right.mean(), "right_low": low, "right_high": high}
-        closed = own.loc[own["strength"] >= _STRONG, "share_closed"].mean()
-        rows.append({"method": method, "robots": len(own), **shares, **means, "share_closed": closed})
+        closed = answered.loc[answered["strength"] >= _STRONG, "share_closed"].mean()
+        rows.append({"method": method, "robots": len(answered), **shares, **means, "share_closed": closed})
     return pd.DataFrame(rows).assign(note=[_NOTES[row["method"]] for row in rows])
 
 
 def _scored(row):
-    """What one way's answer on one robot is worth; NaN where it names nothing."""
+    """Scores of one method's answer on one robot; NaN where it names nothing."""
     if not row["effects"]:
         return dict.fromkeys(("right", "probability_true", "brier", "log_score"), np.nan)
     probabilities = json.loads(row["probabilities"])

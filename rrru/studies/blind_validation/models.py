@@ -1,7 +1,7 @@
-"""Models of robots in files that the check drives: how far they go, and where in a file a cause acts. mm, rad.
+"""Models of robots in files that the check drives: their workspace, and where in a file a cause acts. mm, rad.
 
 Names are those of bodies, joints and connects of the MJCF, a place is `<name>.x` to `<name>.rz`; see
-`rrru.simulation.mujoco_causes`. Beside a place stands the number of our general model that it is.
+`rrru.simulation.mujoco_causes`. Each place is paired with its parameter of our general model.
 """
 
 from dataclasses import dataclass, field
@@ -11,9 +11,9 @@ from dataclasses import dataclass, field
 class Model:
     """half_mm: half the width of the box about its home in which it is driven; targets: places of reflectors.
 
-    links: places that give under one link's force, or across one joint; clearances: joints with play in them;
-    lengths, tilts: pairs of place and number, those of one error together; growth_mm: by body or connect how far its
-    seat moves under a strain of 1.
+    links: places that deflect under the force of one link, or across one joint; clearances: joints with clearance;
+    lengths, tilts: pairs of place and parameter, those of one error together; growth_mm: by body or connect the
+    displacement of its seat under a strain of 1.
     """
 
     half_mm: float
@@ -30,7 +30,7 @@ _PLATES = ("plate", "part2", "part3")
 
 
 def _rrru3():
-    """Base and platform grow alike, which nobody sees."""
+    """Base and platform expand alike, which no measurement shows."""
     legs = tuple(zip((1, 2, 3), _PLATES, strict=True))
     growth = {name: size for k, plate in legs for name, size in _leg_growth(k, plate).items()}
     arms = tuple(((f"crank{k}.x", f"elbow{k}_x"),) for k, _ in legs)
@@ -40,12 +40,12 @@ def _rrru3():
 
 
 def _leg_growth(k, plate):
-    """What moves as a leg of the 3-RRRU grows."""
+    """Displacements under thermal expansion of a leg of the 3-RRRU."""
     return {f"crank{k}": (400.0, 0.0, 0.0), f"forearm{k}": (100.0, 0.0, 0.0), plate: (800.0, 0.0, 0.0)}
 
 
 def _delta():
-    """Its rods hang between balls, so that no place of the file makes them longer: it does not warm up."""
+    """No place of the file lengthens its rods, which hang between ball joints, so this robot does not warm up."""
     rods = [f"{k}{side}" for k in (1, 2, 3) for side in "ab"]
     pairs = ((1, 2), (3, 4), (5, 6))
     return Model(
@@ -61,7 +61,7 @@ def _delta():
 
 
 def _hexapod():
-    """Its legs stand on universal joints, so that no axis can tilt, and always push: clearance never changes side."""
+    """Its legs on universal joints have no axis that can tilt, and always push: clearance never changes side."""
     feet = ((252.3, -62.9), (252.3, 62.9), (-71.7, 249.9), (-180.6, 187.0), (-180.6, -187.0), (-71.7, -249.9))
     ends = ((115.1, -111.1), (115.1, 111.1), (38.7, 155.2), (-153.8, 44.1), (-153.8, -44.1), (38.7, -155.2))
     growth = {f"cylinder{k}": (*foot, 50.0) for k, foot in enumerate(feet, 1)}

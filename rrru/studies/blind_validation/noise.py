@@ -1,6 +1,7 @@
-"""Noises of the check on withheld effects that are not what is stated: white, Gaussian and alike on all axes.
+"""Noises of the check on withheld effects that differ from the stated one: white, Gaussian, equal on all axes.
 
-Sizes are over the stated noise, one sigma per axis. Light to import: the workflow asks for the noises' names.
+Sizes are relative to the stated noise, 1 sigma per axis. The workflow imports this module for the names alone, so it is
+light to import.
 """
 
 from dataclasses import dataclass
@@ -9,10 +10,10 @@ import numpy as np
 
 
 @dataclass(frozen=True)
-class NoiseLaw:
+class NoiseModel:
     """size: of the instrument's noise; axes: its share per axis; correlation: of a first-order autoregression along
-    each run; freedom: of Student's t, infinite for Gaussian noise, sigma kept; scatter: of what the robot does not
-    repeat, white; runs: of offsets from run to run.
+    each run; freedom: degrees of freedom of Student's t of the same sigma, infinite for Gaussian noise; scatter:
+    white non-repeatability of the robot; runs: offsets per run.
     """
 
     size: float = 1.0
@@ -24,7 +25,7 @@ class NoiseLaw:
 
     @property
     def beyond(self):
-        """Rms of what does not repeat from point to point beyond the stated noise, over that noise."""
+        """Rms of the non-repeatability from point to point beyond the stated noise, relative to that noise."""
         more = (self.size * np.array(self.axes)) ** 2 + self.scatter**2 - 1.0
         return float(np.sqrt(np.maximum(more, 0.0).mean()))
 
@@ -34,8 +35,8 @@ class NoiseLaw:
         white = self._white(generator, (len(run), 3))
         scatter = generator.standard_normal((len(run), 3))
         offset = generator.standard_normal((run.max() + 1, 3))[run]
-        own = self.size * np.array(self.axes) * self._correlated(white, run)
-        return noise_mm * (own + self.scatter * scatter + self.runs * offset)
+        instrument = self.size * np.array(self.axes) * self._correlated(white, run)
+        return noise_mm * (instrument + self.scatter * scatter + self.runs * offset)
 
     def _white(self, generator, size):
         """Independent noise of unit variance."""
@@ -56,22 +57,22 @@ class NoiseLaw:
 
 
 NOISES = {
-    "stated_90": NoiseLaw(size=1.0 / 0.9),
-    "stated_80": NoiseLaw(size=1.0 / 0.8),
-    "stated_125": NoiseLaw(size=0.8),
-    "along_20": NoiseLaw(correlation=0.2),
-    "along_50": NoiseLaw(correlation=0.5),
-    "along_80": NoiseLaw(correlation=0.8),
-    "axes": NoiseLaw(axes=(0.5, 1.0, 2.5)),
-    "scatter": NoiseLaw(scatter=1.5),
-    "runs": NoiseLaw(runs=0.5),
-    "tails": NoiseLaw(freedom=3.0),
+    "stated_90": NoiseModel(size=1.0 / 0.9),
+    "stated_80": NoiseModel(size=1.0 / 0.8),
+    "stated_125": NoiseModel(size=0.8),
+    "along_20": NoiseModel(correlation=0.2),
+    "along_50": NoiseModel(correlation=0.5),
+    "along_80": NoiseModel(correlation=0.8),
+    "axes": NoiseModel(axes=(0.5, 1.0, 2.5)),
+    "scatter": NoiseModel(scatter=1.5),
+    "runs": NoiseModel(runs=0.5),
+    "tails": NoiseModel(freedom=3.0),
 }
 
 
-def with_noise(measurements, law, noise_mm, generator):
-    """A measurement table with noise of a law added to its measured positions."""
+def with_noise(measurements, noise, noise_mm, generator):
+    """A measurement table with noise of a NoiseModel added to its measured positions."""
     from rrru.campaign import measurements as rows
 
-    read = rows.measured(measurements) + law.draw(measurements, noise_mm, generator)
+    read = rows.measured(measurements) + noise.draw(measurements, noise_mm, generator)
     return measurements.assign(**rows.vector_columns("measured", read))

@@ -1,7 +1,7 @@
-"""What a campaign's data can tell about the cause of its gap to somebody who knows the true law.
+"""Upper limit of what a campaign's data can show about the cause of its gap, with the true effect model known.
 
-Detection is a likelihood-ratio test: the calibration alone against the calibration with the true causes' columns,
-shapes and legs known, sizes free, noise known. Telling apart is measured by the chi-square that the best wrong
+Detection is a likelihood-ratio test: the calibration alone against the calibration with the columns of the true
+causes. Shapes, legs and noise are known, sizes are free. Confounding is measured by the chi-square that the best wrong
 explanation leaves of the noise-free gap.
 """
 
@@ -14,12 +14,12 @@ from rrru.diagnosis.state import State
 
 _FALSE_ALARMS = 0.01
 _TRUE = "true:"
-_MOST = 3
+_MAX_RIVALS = 3
 
 
 @dataclass(frozen=True)
 class Limits:
-    """Columns of `withheld_limits`; the values here are those where nothing acts that the data could show."""
+    """Columns of `withheld_limits`; the defaults hold where nothing acts that the data could show."""
 
     oracle_chi2: float = 0.0
     oracle_freedom: int = 0
@@ -30,46 +30,46 @@ class Limits:
 
 
 def of_displacement(gain):
-    """Limits of data whose chi-square the true displacement, its size fitted, lowers by a gain."""
+    """Limits of data whose chi-square drops by a gain when the true displacement is fitted, its size free."""
     from scipy.stats import chi2
 
     return Limits(gain, 1, bool(gain > chi2.ppf(1.0 - _FALSE_ALARMS, 1)))
 
 
 def with_truth(library, acting):
-    """A library by name with the acting causes in their true shapes besides."""
-    return library | {f"{_TRUE}{one.effect}": one.law for one in acting}
+    """A library by name together with the acting causes in their true shapes."""
+    return library | {f"{_TRUE}{one.effect}": one.effect_model for one in acting}
 
 
 def limits(case, deviations, acting, names):
-    """Limits of a campaign from its case, calibrated deviations (p,), what acts, and the names of possible rivals.
+    """Limits of a campaign from its case, calibrated deviations (p,), acting causes, and names of possible rivals.
 
     The case's library holds the acting causes too, see `with_truth`.
     """
     from scipy.stats import chi2
 
-    own = {(f"{_TRUE}{one.effect}", 0): one for one in acting}
-    if not own or any(name not in case.library for name, _ in own):
+    causes = {(f"{_TRUE}{cause.effect}", 0): cause for cause in acting}
+    if not causes or any(name not in case.library for name, _ in causes):
         return Limits()
     known = [name for name in names if name in case.library]
     rivals = [(name, shape) for name in known for shape in range(len(case.library[name].coordinates.shapes))]
-    reduced = _Reduced(case, deviations, [*own, *rivals])
-    true = np.concatenate([reduced.columns[key][:, _free(one)] for key, one in own.items()], axis=1)
+    reduced = _Reduced(case, deviations, [*causes, *rivals])
+    true = np.concatenate([reduced.columns[key][:, _free(cause)] for key, cause in causes.items()], axis=1)
     gain = float((reduced.data**2).sum() - _left(true, reduced.data))
     freedom = int(np.linalg.matrix_rank(true))
-    signal = sum(reduced.columns[key] @ np.array(one.coordinates) for key, one in own.items())
+    signal = sum(reduced.columns[key] @ np.array(cause.coordinates) for key, cause in causes.items())
     truth = frozenset(one.effect for one in acting)
-    # what the library does not hold may be imitated by several effects at once
-    most = len(own) if truth <= set(names) else _MOST
+    # several effects at once may be confounded with what the library does not hold
+    most = len(causes) if truth <= set(names) else _MAX_RIVALS
     rival, left = reduced.rival(signal, truth, rivals, most)
     share = 1.0 - float(np.sqrt(left / (signal**2).sum()))
     return Limits(gain, freedom, bool(gain > chi2.ppf(1.0 - _FALSE_ALARMS, freedom)), rival, left, share)
 
 
-def _free(one):
-    """Which coordinates (c,) a cause on one leg, or on all (0), leaves free."""
-    legs = one.law.coordinates.legs
-    return legs == one.leg if one.leg else np.ones(len(legs), dtype=bool)
+def _free(cause):
+    """Which coordinates (c,) of a cause are free: those of its leg, or all where its leg is 0."""
+    legs = cause.effect_model.coordinates.legs
+    return legs == cause.leg if cause.leg else np.ones(len(legs), dtype=bool)
 
 
 def _left(columns, target):
@@ -79,7 +79,7 @@ def _left(columns, target):
 
 
 class _Reduced:
-    """Data and columns in units of the noise, calibration projected out, rotated so that few rows are left."""
+    """Data and columns in units of the noise, calibration projected out, reduced to few rows by QR."""
 
     def __init__(self, case, deviations, keys):
         self._library = case.library
@@ -94,7 +94,7 @@ class _Reduced:
         self.data = triangle[:, -1]
 
     def rival(self, signal, truth, rivals, most):
-        """Name and chi-square of the wrong set, of up to `most` effects, that leaves least of a signal (k,)."""
+        """Name and chi-square of the wrong set, of up to `most` effects, with the least residual of a signal (k,)."""
         best = ("", np.inf)
         for size in range(1, most + 1):
             for keys in combinations(rivals, size):
@@ -107,7 +107,7 @@ class _Reduced:
         return best
 
     def _left_by(self, keys, signal):
-        """Sum of squares that a set leaves of a signal, positive coordinates kept so."""
+        """Sum of squares that a set leaves of a signal, with bounds at zero for positive coordinates."""
         columns = np.concatenate([self.columns[key] for key in keys], axis=1)
         positive = np.concatenate([self._library[name].coordinates.positive for name, _ in keys])
         left = _left(columns, signal)

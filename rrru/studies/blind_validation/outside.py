@@ -1,6 +1,6 @@
-"""Causes of a gap that the library does not hold, so that a diagnosis has to say "unexplained". Lengths mm, angles rad.
+"""Causes of a gap outside the library, for which the correct verdict is "unexplained". Lengths mm, angles rad.
 
-Effects as the library's are, used by the plant alone; sizes and places are assumed.
+They are Effects like those of the library, but only the plant uses them. Sizes and places are assumed.
 """
 
 import numpy as np
@@ -20,12 +20,12 @@ _SHARES = (0.3, 0.5, 0.7)
 
 
 def _shifted(motion, shift_mm):
-    """What is measured shifted by (n, 3)."""
+    """The measured positions shifted by (n, 3)."""
     return motion.at({WORLD: np.concatenate([shift_mm, np.zeros_like(shift_mm)], axis=1)})
 
 
 def _rehoming(motion, values):
-    """Drives that find their zero anew before every run, off by up to their switch's repeatability (rad)."""
+    """The drives are homed before every run, with errors up to their switch's repeatability (rad)."""
     run = np.cumsum(np.diff(motion.time_s, prepend=motion.time_s[0]) > _REST_S)
     offset = np.random.default_rng(int(values[3])).uniform(-1.0, 1.0, (run[-1] + 1, 3))
     return motion.at_drives(values[:3] * offset[run])
@@ -37,7 +37,7 @@ def _tripod_sway(motion, values):
 
 
 def _tracker_bump(motion, values):
-    """The tracker is bumped once: from a share of the campaign's time on it reads shifted (mm) per axis."""
+    """The tracker is bumped once: after a fraction of the campaign's time its readings are shifted (mm) per axis."""
     passed = (motion.time_s - motion.time_s[0]) / np.ptp(motion.time_s)
     return _shifted(motion, (passed > values[3])[:, None] * values[:3])
 
@@ -49,11 +49,11 @@ def _cable_pull(motion, values):
     return _shifted(motion, values[0] * np.maximum(length - _SLACK_MM, 0.0) * reach / length)
 
 
-def _make(law, parameters, typical, shapes=({},)):
-    """The cause of a law with its parameters, typical sizes of those that no shape fixes, and its shapes."""
+def _make(contribution, parameters, typical, shapes=({},)):
+    """The Effect of a contribution with its parameters, typical sizes of those that no shape fixes, and its shapes."""
     parameters = ParameterSet(parameters)
     coordinates = plain_coordinates(parameters, typical, shapes)
-    return Effect(law.__name__.strip("_"), parameters, coordinates, law, ("time_s",))
+    return Effect(contribution.__name__.strip("_"), parameters, coordinates, contribution, ("time_s",))
 
 
 def _axes(name, unit, limit):
@@ -77,18 +77,18 @@ OUTSIDE = {
     )
 }
 _LIBRARY = library(Rrru3())
-# these campaigns cannot show it: their robots do not stop at points, no temperature is told, all lengths are calibrated
+# these campaigns cannot show them: no stops at points, no temperature recorded, all lengths calibrated
 _UNSEEN = ("read_before_rest", "thermal_expansion", "tracker_scale")
 
 
 def drawn_effects(known):
     """Effects by name of a robot's library that may be drawn as causes.
 
-    What holds others is a background, no cause that is drawn.
+    An effect with others as special cases is a background and not drawn.
     """
     return {name: effect for name, effect in known.items() if name not in (*HOLDS, *_UNSEEN)}
 
 
-# of the library and from outside, whatever may act in a 3-RRRU of the check
+# every effect, of the library and from outside it, that may act in a 3-RRRU of the check
 EFFECTS = drawn_effects(_LIBRARY)
 CAUSES = _LIBRARY | OUTSIDE

@@ -1,4 +1,4 @@
-"""The plants that drive a robot of a file with a fault: our own laws, and MuJoCo. Lengths mm, angles rad, N, kg."""
+"""The plants that simulate a robot of a file with a fault: our own effect models, and MuJoCo. mm, rad, N, kg."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -10,14 +10,14 @@ from rrru.effects.protocol import ActiveEffect
 from rrru.simulation.virtual_robot import VirtualRobot
 from rrru.studies.blind_validation.faults import KINDS, kind_of
 
-# servos whose friction shows, in N mm/rad or N/mm: so stiff that weight does not
+# servo stiffnesses at which friction shows and weight does not, in N mm/rad or N/mm
 _STIFF = {"rad": 4e9, "mm": 2e3}
 
 
 def own(conditions, offsets, *faults):
     """The VirtualRobot of a file with Faults.
 
-    offsets: errors of its first candidates, of which the drives' (K,) come first.
+    offsets: errors of its first candidate parameters; the (K,) of the drives come first.
     """
     robot, masses, effects = conditions.mechanism, conditions.masses, []
     deviations = {one.name: offset for one, offset in zip(robot.candidates, offsets, strict=False)}
@@ -36,12 +36,12 @@ def own(conditions, offsets, *faults):
 
 
 def _turned(fault):
-    """What turns the weight in the frame of a base that is not level."""
+    """Rotation of the direction of gravity in the frame of a base that is not level."""
     return Rotation.from_rotvec([fault.more["tilt_x_rad"], fault.more["tilt_y_rad"], 0.0]).inv()
 
 
 def mujoco(conditions, offsets, fault=None):
-    """The MujocoRobot of the same."""
+    """The MujocoRobot of a file with a Fault; offsets (K,) as for `own`."""
     from rrru.simulation.mujoco_robot import MujocoRobot
 
     causes = {"zero_offset": dict(zip(drives(conditions.mechanism), offsets, strict=True))}

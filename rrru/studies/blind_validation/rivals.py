@@ -1,4 +1,4 @@
-"""Other ways to find the cause of a gap, from the same campaign, linearisation and stated noise as the diagnosis.
+"""Other methods to find the cause of a gap, with the campaign, linearisation and stated noise of the diagnosis.
 
 Bayes' information criterion of linear signatures (G. Schwarz, Annals of Statistics 6, 1978), the lasso with that
 criterion (H. Zou, T. Hastie, R. Tibshirani, Annals of Statistics 35, 2007) over resampled points, a spike and slab on
@@ -29,19 +29,21 @@ _RESAMPLED, _FOLDS = 50, 5
 # its coefficients on columns of unit length, in units of the noise
 _SWEEPS, _DROPPED, _ACTS = 1500, 300, 0.1
 _SLABS = np.geomspace(3.0, 1000.0, 6)
-# a set's columns are as many as they have singular values above this share of the largest
+# relative singular value below which a column of a set does not count
 _RANK = 1e-5
-# what the calibration leaves less of than this share is not seen
+# a column with a smaller fraction after projection onto the complement of the calibration is not visible
 _LEAST_VISIBLE = 1e-6
-# points of which a Gaussian process learns its sizes
+# number of points for the hyperparameters of the Gaussian process
 _LEARNED_FROM = 250
 _NAMED = ("time_s", "speed_mm_s", "payload_kg")
 
 
 @dataclass(frozen=True)
 class Campaign:
-    """What all ways are given of n points: the case; over the stated noise the data (3n,), the calibration's columns
-    (3n, p), and those (3n, k) of every EffectTerm that the diagnosis tries: effect, shape and legs.
+    """Input of all methods for n points.
+
+    data (3n,), base (3n, p): data and columns of the calibration, in units of the stated noise; columns: those (3n, k)
+    of every EffectTerm that the diagnosis tries: effect, shape and legs.
     """
 
     case: Case
@@ -55,7 +57,7 @@ class Campaign:
         mechanism = sim(known.mechanism)
         case = make_case(measurements, mechanism, known.masses, known.noise_mm, library)
         calibrated = State(calibrate(select(measurements, mechanism, ["*"])).deviations, {})
-        # the diagnosis finds the waves of laws of many coefficients; they are no signatures
+        # the diagnosis searches the waves of effects with many coefficients; these have no fixed signatures
         effects = {name: effect for name, effect in case.effects.items() if not effect.coordinates.broad}
         keys = [(name, k) for name, effect in effects.items() for k in range(len(effect.coordinates.shapes))]
         linear = case.linearise(calibrated, keys)
@@ -66,7 +68,7 @@ class Campaign:
 
 
 def _unit(columns, base):
-    """Columns (n, k) without the part that the calibration's (n, p) take up, of unit length; zero where all is."""
+    """Columns (n, k) projected onto the complement of base (n, p), of unit length; zero where nothing remains."""
     basis, _ = np.linalg.qr(base)
     left, whole = columns - basis @ (basis.T @ columns), np.linalg.norm(columns, axis=0)
     size = np.linalg.norm(left, axis=0)
@@ -96,14 +98,14 @@ def bayes_information(campaign):
 
 
 def _explained(gram, moment):
-    """Sum of squares that columns take off, from their Gram matrix (k, k) and moments (k,), and their rank."""
+    """Reduction of the sum of squares by columns, from their Gram matrix (k, k) and moments (k,), and their rank."""
     size, turned = np.linalg.eigh(gram)
-    kept = size > _RANK**2 * max(size[-1], 1e-300)
-    return float(((turned[:, kept].T @ moment) ** 2 / size[kept]).sum()), int(kept.sum())
+    used = size > _RANK**2 * max(size[-1], 1e-300)
+    return float(((turned[:, used].T @ moment) ** 2 / size[used]).sum()), int(used.sum())
 
 
 def lasso(campaign, generator):
-    """Share by set of effects of resamplings of the points in which the lasso keeps a coefficient of just these."""
+    """Fraction of resamplings of the points, by the set of effects with a nonzero coefficient of the lasso."""
     from sklearn.exceptions import ConvergenceWarning
     from sklearn.linear_model import LassoLarsIC
 
@@ -117,7 +119,7 @@ def lasso(campaign, generator):
         data = campaign.data[drawn] - base @ np.linalg.lstsq(base, campaign.data[drawn], rcond=None)[0]
         model = LassoLarsIC(criterion="bic", fit_intercept=False, noise_variance=1.0)
         with warnings.catch_warnings():
-            # columns that do the same are told apart by rounding
+            # identical columns differ by rounding only
             warnings.simplefilter("ignore", ConvergenceWarning)
             model.fit(_unit(columns[drawn], base), data)
         found[_label(owner[model.coef_ != 0.0].tolist())] += 1
@@ -125,10 +127,10 @@ def lasso(campaign, generator):
 
 
 def spike_and_slab(campaign, generator):
-    """Share by set of effects of a Gibbs sampler's sweeps in which just these have coefficients other than zero.
+    """Fraction of a Gibbs sampler's sweeps, by the set of effects with nonzero coefficients.
 
     Each effect acts with the same probability, in one of its shapes and choices of legs and with one of `_SLABS` for
-    all its coefficients, each alike; coefficients are averaged out.
+    all its coefficients, with equal prior probabilities; coefficients are marginalised.
     """
     terms = list(campaign.columns)
     numbers = np.split(
@@ -143,29 +145,31 @@ def spike_and_slab(campaign, generator):
         choices.setdefault(term.effect, []).append(number)
     state, found = {}, Counter()
     for sweep in range(_SWEEPS):
-        for effect, own in choices.items():
-            rest = [one for name, one in state.items() if name != effect]
+        for effect, terms_of_effect in choices.items():
+            others = [term for name, term in state.items() if name != effect]
             slab = state[effect][1] if effect in state else generator.choice(_SLABS)
-            log = [_marginal(gram, moment, numbers, [*rest, (number, slab)]) for number in own]
-            log = np.array([_marginal(gram, moment, numbers, rest) + np.log(len(own) * (1.0 / _ACTS - 1.0)), *log])
+            log = [_marginal(gram, moment, numbers, [*others, (number, slab)]) for number in terms_of_effect]
+            log_without = _marginal(gram, moment, numbers, others) + np.log(len(terms_of_effect) * (1.0 / _ACTS - 1.0))
+            log = np.array([log_without, *log])
             chosen = _drawn(log, generator)
             state.pop(effect, None)
             if chosen:
-                log = [_marginal(gram, moment, numbers, [*rest, (own[chosen - 1], one)]) for one in _SLABS]
-                state[effect] = own[chosen - 1], _SLABS[_drawn(np.array(log), generator)]
+                term = terms_of_effect[chosen - 1]
+                log = [_marginal(gram, moment, numbers, [*others, (term, slab)]) for slab in _SLABS]
+                state[effect] = term, _SLABS[_drawn(np.array(log), generator)]
         if sweep >= _DROPPED:
             found[_label(state)] += 1
     return {effects: count / (_SWEEPS - _DROPPED) for effects, count in found.items()}
 
 
 def _drawn(log, generator):
-    """A number drawn by the logarithms (n,) of weights."""
+    """A random index with the logarithms (n,) of its weights."""
     weights = np.exp(log - log.max())
     return int(generator.choice(len(weights), p=weights / weights.sum()))
 
 
 def _marginal(gram, moment, numbers, chosen):
-    """Log marginal likelihood over that of no term of chosen (number of a term, slab), the coefficients averaged out.
+    """Log marginal likelihood ratio to no term, for chosen pairs (number of a term, slab), coefficients marginalised.
 
     gram (k, k), moment (k,): of all columns; numbers: of the columns of each term.
     """
@@ -179,7 +183,7 @@ def _marginal(gram, moment, numbers, chosen):
 
 
 def gaussian_process(campaign):
-    """Share of the gap that a Gaussian process of place, direction, time, speed and payload predicts on left-out runs.
+    """Fraction of the gap predicted on held-out runs by a Gaussian process of place, direction, time, speed, payload.
 
     NaN where nothing is left above the noise.
     """
@@ -195,18 +199,18 @@ def gaussian_process(campaign):
     few = slice(None, None, max(len(seen) // _LEARNED_FROM, 1))
     kernel = ConstantKernel(1.0, (1e-3, 1e5)) * RBF(np.ones(seen.shape[1]), (1e-1, 1e3))
     with warnings.catch_warnings():
-        # a size at its bound is an answer: what is seen does not matter
+        # a length scale at its bound is valid: that input does not matter
         warnings.simplefilter("ignore")
         kernel = GaussianProcessRegressor(kernel, alpha=1.0).fit(seen[few], left[few]).kernel_
     after = np.empty_like(left)
     runs = points["run"].to_numpy()
-    for learned, told in GroupKFold(min(_FOLDS, len(np.unique(runs)))).split(seen, groups=runs):
+    for learned, held_out in GroupKFold(min(_FOLDS, len(np.unique(runs)))).split(seen, groups=runs):
         model = GaussianProcessRegressor(kernel, alpha=1.0, optimizer=None).fit(seen[learned], left[learned])
-        after[told] = left[told] - model.predict(seen[told])
+        after[held_out] = left[held_out] - model.predict(seen[held_out])
     gaps = [np.sqrt(max((one**2).sum(axis=1).mean() - 3.0, 0.0)) for one in (left, after)]
     return float(1.0 - gaps[1] / gaps[0]) if gaps[0] > 0.0 else np.nan
 
 
 def _label(effects):
-    """Names of effects, each once, as a verdict has them."""
+    """Names of effects, each once, in the order of a verdict."""
     return in_order("+".join(set(effects))) or NONE

@@ -1,4 +1,4 @@
-"""Virtual robots of the check on withheld effects: what acts in each, and its campaign. Lengths mm, angles rad."""
+"""Virtual robots of the check on withheld effects: their acting causes and campaigns. Lengths mm, angles rad."""
 
 import json
 from dataclasses import asdict, dataclass, field, replace
@@ -15,11 +15,11 @@ from rrru.kinematics.dynamics import Masses
 from rrru.seeds import stream
 from rrru.simulation.virtual_robot import VirtualRobot
 from rrru.studies import setup
-from rrru.studies.blind_validation.noise import NoiseLaw, with_noise
+from rrru.studies.blind_validation.noise import NoiseModel, with_noise
 from rrru.studies.blind_validation.outside import CAUSES, OUTSIDE
 from rrru.studies.blind_validation.verdicts import PREFIX
 
-# no calibration shall hit a bound
+# wide, so that no calibration ends at a bound
 _WIDE = {"angle_rad": 0.5, "length_mm": 400.0}
 
 _PLAIN = {"reverse": False, "payload_kg": 0.0}
@@ -41,7 +41,7 @@ PASSES = {
 
 @dataclass(frozen=True)
 class Conditions:
-    """What all robots share: nominal mechanism, motion as in the configuration, masses, noise per axis, seed."""
+    """Conditions of all robots: nominal mechanism, motion as in the configuration, masses, noise per axis, seed."""
 
     mechanism: object
     motion: dict
@@ -51,7 +51,7 @@ class Conditions:
 
     @classmethod
     def from_config(cls, settings):
-        """The conditions from what a rule is told: robot, masses, motion, withheld.noise_mm, seed."""
+        """The conditions from the settings of a rule: robot, masses, motion, withheld.noise_mm, seed."""
         mechanism, masses = setup.mechanism(settings["robot"] | {"bounds": _WIDE}), Masses(**settings["masses"])
         return cls(mechanism, settings["motion"], masses, settings["withheld"]["noise_mm"], settings["seed"])
 
@@ -61,7 +61,7 @@ class Conditions:
         return self.noise_mm * np.sqrt(3.0)
 
     def seen(self, _):
-        """The nominal robot with the numbers that a measurement table tells."""
+        """The nominal robot with the parameters that a measurement table observes."""
         return self.mechanism
 
 
@@ -75,9 +75,9 @@ class WithheldCampaign(setup.VirtualCampaign):
 
 @dataclass(frozen=True)
 class Acting:
-    """One cause that acts.
+    """One acting cause.
 
-    shape: values of the parameters that are no coordinates; coordinates (c,); leg: the one that it is on, or 0;
+    shape: values of the parameters that are not coordinates; coordinates (c,); leg: its single leg, or 0;
     strength: gap over noise.
     """
 
@@ -93,32 +93,32 @@ class Acting:
         return self.effect in OUTSIDE
 
     @property
-    def law(self):
-        """The cause itself, known in its true shape alone."""
-        law = CAUSES[self.effect]
-        return replace(law, coordinates=replace(law.coordinates, shapes=(self.shape,)))
+    def effect_model(self):
+        """The Effect with its true shape only."""
+        effect = CAUSES[self.effect]
+        return replace(effect, coordinates=replace(effect.coordinates, shapes=(self.shape,)))
 
     @property
     def values(self):
         """Parameter values (p,)."""
-        return self.law.coordinates.to_values(np.array(self.coordinates), self.shape)
+        return self.effect_model.coordinates.to_values(np.array(self.coordinates), self.shape)
 
     @classmethod
     def from_mapping(cls, section):
-        """The cause of its fields, as JSON holds them."""
+        """The cause from its JSON fields."""
         return cls(**(section | {"coordinates": tuple(section["coordinates"])}))
 
     def scaled(self, factor):
-        """The same cause, so many times as large."""
+        """The same cause with its coordinates multiplied by a factor."""
         return replace(self, coordinates=tuple((factor * np.array(self.coordinates)).tolist()))
 
 
 @dataclass(frozen=True)
 class Robot:
-    """A robot of the check: kind of campaign, trajectories as in the configuration, deviations (7,), what acts.
+    """A robot of the check: kind of campaign, trajectories as in the configuration, deviations (7,), acting causes.
 
-    background: what acts besides as in every robot, no cause that is asked for; noise: fields of the NoiseLaw that are
-    not as stated.
+    background: causes that act in every robot and that the diagnosis need not find; noise: fields of the NoiseModel
+    that are not as stated.
     """
 
     name: str
@@ -132,24 +132,26 @@ class Robot:
 
     @property
     def causes(self):
-        """All that acts, the background last."""
+        """All acting causes, the background last."""
         return self.acting + self.background
 
     def plan(self, conditions):
-        """What it is told to do."""
+        """Its campaign plan."""
         return make_plan(from_config(self.trajectories), PASSES[self.kind], **conditions.motion)
 
     def campaign(self, conditions):
-        """The virtual robot and its plan, or None where a parameter of what acts breaks its bounds."""
-        if not all(one.law.parameters.hold(one.values) for one in self.causes):
+        """The virtual robot and its plan, or None where a parameter of an acting cause violates its bounds."""
+        if not all(one.effect_model.parameters.hold(one.values) for one in self.causes):
             return None
         deviations = conditions.mechanism.parameters.mapping(self.deviations)
-        # of r - R, which alone is identifiable, r has the whole
+        # only r - R is identifiable; its whole error is given to r
         deviations["dr"] = deviations.pop("da")
         robot = VirtualRobot(
             conditions.mechanism,
             deviations,
-            effects=tuple(ActiveEffect(one.law, one.law.parameters.mapping(one.values)) for one in self.causes),
+            effects=tuple(
+                ActiveEffect(one.effect_model, one.effect_model.parameters.mapping(one.values)) for one in self.causes
+            ),
             masses=conditions.masses,
         )
         return WithheldCampaign(robot, self.plan(conditions), conditions.noise_mm, conditions.seed, self.name)
@@ -159,8 +161,8 @@ class Robot:
         campaign = self.campaign(conditions)
         if not self.noise:
             return campaign.run()[0]
-        law = NoiseLaw(**self.noise)
-        return with_noise(noise_free(self, conditions), law, conditions.noise_mm, campaign.generator())
+        noise = NoiseModel(**self.noise)
+        return with_noise(noise_free(self, conditions), noise, conditions.noise_mm, campaign.generator())
 
     @property
     def truth(self):
@@ -170,12 +172,12 @@ class Robot:
 
     @property
     def cause(self):
-        """What acts, as a plant names it."""
+        """The acting causes, as the plant names them."""
         return self.truth
 
     def numbers(self, _):
         """True values of the library's parameters by effect and name."""
-        return {one.effect: one.law.parameters.mapping(one.values) for one in self.causes if not one.outside}
+        return {one.effect: one.effect_model.parameters.mapping(one.values) for one in self.causes if not one.outside}
 
     def answer(self, conditions):
         """The robot's row of `withheld_answers`."""
@@ -191,13 +193,13 @@ class Robot:
 
     @classmethod
     def from_mapping(cls, section):
-        """The robot of its fields, as JSON holds them."""
+        """The robot from its JSON fields."""
         causes = {key: tuple(map(Acting.from_mapping, section[key])) for key in ("acting", "background")}
         return cls(**(section | causes | {"deviations": tuple(section["deviations"])}))
 
 
 def noise_free(robot, conditions):
-    """Measurements of a robot without noise, or None where a parameter breaks its bounds or a pose is lost."""
+    """Measurements of a robot without noise, or None where a parameter violates its bounds or a pose is lost."""
     campaign = robot.campaign(conditions)
     if campaign is None:
         return None
@@ -206,7 +208,7 @@ def noise_free(robot, conditions):
 
 
 def true_gap_mm(robot, conditions):
-    """Rms distance that the calibration leaves without noise, or None where the robot cannot drive its campaign."""
+    """Rms residual distance of the calibration without noise, or None where the robot cannot drive its campaign."""
     measurements = noise_free(robot, conditions)
     if measurements is None:
         return None

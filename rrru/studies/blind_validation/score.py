@@ -1,4 +1,4 @@
-"""Verdicts beside the truth that was withheld from the diagnosis: the only code that sees both."""
+"""Verdicts compared with the truth that was withheld from the diagnosis. No other code sees both."""
 
 from dataclasses import asdict, replace
 from typing import NamedTuple
@@ -18,7 +18,7 @@ from rrru.studies.blind_validation.states import state_of
 from rrru.studies.blind_validation.verdicts import PLANTS, SEVERAL_CAUSES, is_right, scores
 
 _LIMITS = ["oracle_chi2", "oracle_freedom", "oracle_detects", "rival", "rival_chi2", "imitated_share"]
-# checks of one or two causes under the stated noise, whose limits are computed
+# limits are computed for the checks with one or two causes and the stated noise
 _LIMITED = ("label", "effect", *PLANTS)
 
 
@@ -32,52 +32,53 @@ class Scored(NamedTuple):
 
 
 def score_chunk(answers, measurements, verdicts, stated, states, budget, known):
-    """What is Scored of the robots of a chunk from the six frames about them.
+    """The Scored tables of the robots of a chunk.
 
-    known: what is Known of their robots by the entry of their files, with an empty name of our own.
+    answers, measurements, verdicts, stated, states, budget: frames of these robots; known: Known by the entry of the
+    robot's file, with an empty name for our own 3-RRRU.
     """
-    told = answers.merge(verdicts, on=["robot", "kind"]).merge(states, on="robot")
+    robots = answers.merge(verdicts, on=["robot", "kind"]).merge(states, on="robot")
     points, found, on_causes = (dict(list(frame.groupby("robot"))) for frame in (measurements, budget, stated))
     measured, listed, causes = [], [], []
-    for row in told.to_dict("records"):
+    for row in robots.to_dict("records"):
         name, robot = row["robot"], robot_of(row["drawn"])
         about = known[robot.file]
         taken_out = row["truth"] if row["check"] == "effect" else ""
-        own = parts(robot, row["effects"], found[name], about.conditions.noise_rms_mm, taken_out)
-        on_own = on_causes.get(name, empty_causes())
-        right = _right(row, robot, own, groups_of(on_own))
+        parts_of_gap = parts(robot, row["effects"], found[name], about.conditions.noise_rms_mm, taken_out)
+        statements = on_causes.get(name, empty_causes())
+        right = _right(row, robot, parts_of_gap, groups_of(statements))
         measured.append(_measured(row, robot, points[name], about, taken_out) | {"right": right})
-        listed.append(own.assign(check=row["check"], robot=name))
-        if len(on_own):
-            causes.append(causes_of(on_own, robot).assign(check=row["check"]))
-    told = told.assign(**pd.DataFrame(measured, index=told.index))
-    limited = told.loc[told["check"].isin(_LIMITED), ["check", "robot", "weakest", *_LIMITS]]
-    # where readings allow no effect to be tested nothing is stated
+        listed.append(parts_of_gap.assign(check=row["check"], robot=name))
+        if len(statements):
+            causes.append(causes_of(statements, robot).assign(check=row["check"]))
+    robots = robots.assign(**pd.DataFrame(measured, index=robots.index))
+    limited = robots.loc[robots["check"].isin(_LIMITED), ["check", "robot", "weakest", *_LIMITS]]
+    # measurements that allow no test of an effect have no statement
     stated_causes = pd.concat(causes or [empty_causes()], ignore_index=True)
-    return Scored(scores(told), limited, pd.concat(listed, ignore_index=True), stated_causes)
+    return Scored(scores(robots), limited, pd.concat(listed, ignore_index=True), stated_causes)
 
 
 def _right(row, robot, listed, groups):
-    """Whether the verdict of a row on a robot is right.
+    """Whether the verdict of a row on a robot is correct.
 
-    listed: the robot's rows of `withheld_parts`; groups: of causes that the verdict cannot tell apart.
+    listed: the robot's rows of `withheld_parts`; groups: of causes that are confounded in the verdict.
     """
     if row["check"] in SEVERAL_CAUSES:
         return is_enough(listed, row["strength"], groups)
     effects = row["effects"]
     if robot.file:
-        effects = "+".join(name for name in effects.split("+") if name not in robot.beside) or effects
+        effects = "+".join(name for name in effects.split("+") if name not in robot.also_allowed) or effects
     return is_right(row["truth"], effects, row["check"])
 
 
 def _measured(row, robot, points, about, taken_out):
-    """What is computed from a robot itself: limits, the share of its gap that is truly closed, numbers that hold."""
-    calibrated, state, laws = state_of(row, about.library)
+    """Columns that need the robot itself: limits, true explained fraction of the gap, coverage of its numbers."""
+    calibrated, state, effects = state_of(row, about.library)
     case = _case(points.reset_index(drop=True), about, about.library)
-    closed = true_share(robot, about, case.mechanism, calibrated, (state, laws))
+    closed = true_share(robot, about, case.mechanism, calibrated, (state, effects))
     numbers, hold = held(row["numbers"], robot.numbers(about.conditions))
-    told = {"file": robot.file, "cause": robot.cause, "share_closed_true": closed, "numbers": numbers, "held": hold}
-    return told | asdict(_limits(row, robot, points, about, calibrated, taken_out))
+    columns = {"file": robot.file, "cause": robot.cause, "share_closed_true": closed, "numbers": numbers, "held": hold}
+    return columns | asdict(_limits(row, robot, points, about, calibrated, taken_out))
 
 
 def _limits(row, robot, points, about, calibrated, taken_out):
@@ -87,37 +88,38 @@ def _limits(row, robot, points, about, calibrated, taken_out):
     if robot.file:
         return of_displacement(robot.oracle_chi2)
     case = _case(points.reset_index(drop=True), about, with_truth(about.library, robot.acting))
-    return limits(case, calibrated, robot.acting, _known(about.library, taken_out))
+    return limits(case, calibrated, robot.acting, _rivals(about.library, taken_out))
 
 
-def _known(library, taken_out):
-    """Names of a library without an effect, those that hold it as a special case, and laws of many coefficients.
+def _rivals(library, taken_out):
+    """Names of the effects that may be a wrong explanation.
 
-    The last imitate whatever depends on the drives' values.
+    Not among them: the effect taken out, effects with it as a special case, and effects with many coefficients. The
+    last are confounded with everything that depends on the actuator positions.
     """
     few = [name for name, effect in library.items() if not effect.coordinates.broad]
     return [name for name in few if name != taken_out and taken_out not in HOLDS.get(name, ())]
 
 
 def _case(measurements, about, library, mechanism=None):
-    """The case of measurements under what is Known, with the numbers that these tell by default."""
+    """The Case of measurements under Known; the mechanism is by default the one that these measurements observe."""
     conditions = about.conditions
     mechanism = mechanism or conditions.seen(measurements)
     return make_case(measurements, mechanism, conditions.masses, conditions.noise_mm, library)
 
 
 def true_share(robot, about, mechanism, calibrated, corrected):
-    """Share of the true gap that the corrected sim closes on runs never driven; NaN without gap or with a lost pose.
+    """Fraction of the true gap that the corrected model explains on new runs; NaN without gap or with a lost pose.
 
-    mechanism: with the numbers that were calibrated; corrected: the State and its effects by name.
+    mechanism: with the calibrated parameters; corrected: the State and its effects by name.
     """
-    state, laws = corrected
+    state, effects = corrected
     driven = fresh_runs(robot, about.conditions)
     if driven is None:
         return np.nan
     case = _case(driven, about, about.library, mechanism)
-    case = replace(case, library=case.library | laws).standing(state)
-    # an effect of the drives' sense of arrival says nothing where that is unknown
+    case = replace(case, library=case.library | effects).standing(state)
+    # an effect that depends on the direction of approach predicts nothing where that direction is unknown
     known = case.complete({name for name, _ in state.effects} & case.known.keys())
     before, after = case.residual(State(calibrated, {}))[known], case.residual(state)[known]
     return float(1.0 - np.sqrt((after**2).sum() / (before**2).sum()))

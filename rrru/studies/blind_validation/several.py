@@ -1,7 +1,7 @@
-"""Robots of files as robots are: errors of all numbers, scatter, noise not as stated, several causes. Lengths mm.
+"""Robots of files as robots are: errors of all parameters, scatter, noise not as stated, several causes. Lengths mm.
 
-Our own plant drives them with the laws of the diagnosis. Their axes are off as those of the 3-RRRU of our own are. A
-calibration of all numbers finds these errors: they are no cause.
+Our own plant simulates them with the effect models of the diagnosis. Their joint axes have the errors of our own
+3-RRRU. A full calibration identifies these errors, so they are not causes.
 """
 
 from dataclasses import replace
@@ -24,10 +24,10 @@ from rrru.studies.blind_validation.draw import (
 from rrru.studies.blind_validation.faults import OUTSIDE_OF_ANY, Fault, kind_of
 from rrru.studies.blind_validation.outside import drawn_effects
 
-# a calibration of all numbers takes these up but for terms of second order
+# a full calibration absorbs these to first order
 _CALIBRATED = ("frame_misregistration", "tool_offset")
-# draws of a cause's strength and ratios before another cause is drawn, and how far its gap may be off the drawn one
-_TRIES, _OFF = 3, 0.1
+# draws of strength and ratios before another cause is drawn; allowed relative error of its gap
+_TRIES, _MAX_ERROR = 3, 0.1
 
 
 def draw(member, conditions):
@@ -43,7 +43,7 @@ def draw(member, conditions):
         acting = _some(robot, effects, count, generator, conditions)
         acting += _some(robot, OUTSIDE_OF_ANY, int(outside), generator, conditions)
         drawn = replace(robot, acting=acting)
-        # several causes may lose a pose together that none loses alone
+        # several causes together may lose a pose that none of them loses alone
         if len(acting) == count + outside and not np.isnan(foreign.gap_over_noise(drawn, conditions)):
             return drawn, drawn.measured(conditions)
         robot = replace(robot, trajectories=draw_trajectories(generator, conditions))
@@ -54,14 +54,14 @@ def bare(member, generator, conditions):
     """The robot without causes: errors of drives and axes, and noise that is not as stated."""
     numbers = conditions.mechanism.candidates
     drives = len(conditions.mechanism.parts.units)
-    size = [(foreign.OFFSET_SD if k < drives else AXES_SD)[one.unit] for k, one in enumerate(numbers)]
+    size = [(foreign.OFFSET_SD if k < drives else AXES_SD)[number.unit] for k, number in enumerate(numbers)]
     offsets = (size * generator.standard_normal(len(size))).tolist()
     trajectories, noise = draw_trajectories(generator, conditions), noise_not_as_stated(generator)
     return foreign.FileRobot(member.name, member.file, "own", trajectories, tuple(offsets), noise=noise, rests=False)
 
 
 def _some(robot, names, count, generator, conditions):
-    """So many causes out of names, of those that a calibration does not take up."""
+    """Up to count causes out of names, without those that a calibration absorbs."""
     found = []
     for name in generator.permutation(names).tolist():
         if len(found) == count:
@@ -75,7 +75,7 @@ def _some(robot, names, count, generator, conditions):
 def _cause(robot, name, generator, conditions):
     """A cause of a strength drawn log-uniform from MANY, or None where no draw has it.
 
-    What a calibration takes up but for terms of second order is none: its gap is not twice as large for twice the size.
+    A cause that a calibration absorbs to first order is dropped: its gap does not double with its size.
     """
     coordinates = kind_of(name).law(conditions.mechanism).coordinates
     for _ in range(_TRIES):
@@ -88,6 +88,6 @@ def _cause(robot, name, generator, conditions):
         alone, half = (
             foreign.gap_over_noise(replace(robot, acting=(fault.scaled(factor),)), conditions) for factor in (1.0, 0.5)
         )
-        if max(abs(alone - strength), abs(2.0 * half - strength)) < _OFF * strength:
+        if max(abs(alone - strength), abs(2.0 * half - strength)) < _MAX_ERROR * strength:
             return replace(fault, strength=alone)
     return None

@@ -1,4 +1,4 @@
-"""What a diagnosis states about each cause that it tested: probability, decision and group, made without any answer."""
+"""Statements of a diagnosis on each tested cause: probability, decision and group, made without the truth."""
 
 import pandas as pd
 
@@ -9,7 +9,7 @@ BETWEEN = " | "
 def stated(robot, diagnosis):
     """Frame `withheld_stated` of a robot, one row for each tested effect, from its Diagnosis.
 
-    The probability is that of the posterior, whatever the decision is.
+    The probability is the posterior probability, whatever the decision is.
     """
     inference, verdict = diagnosis.inference, diagnosis.decided
     rows = []

@@ -1,4 +1,4 @@
-"""Corrected sims as rows of a table. Lengths mm, angles rad."""
+"""Corrected models as rows of a table. Lengths mm, angles rad."""
 
 import json
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from rrru.diagnosis.state import State
 
-# what a verdict is scored by, and what tells whether it is ambiguous
+# columns that a verdict is scored by, and columns that show whether it is ambiguous
 VERDICT = [
     "effects",
     "probability",
@@ -20,7 +20,7 @@ VERDICT = [
 
 
 def state_row(robot, calibrated, state, library, numbers="[]"):
-    """Row of `withheld_states` from the calibrated deviations (p,), the corrected sim and its numbers' errors.
+    """Row of `withheld_states` from calibrated deviations (p,), State of the corrected model and its fitted numbers.
 
     library: effects by name as the diagnosis fitted them.
     """
@@ -39,18 +39,18 @@ def state_row(robot, calibrated, state, library, numbers="[]"):
 
 
 def state_of(row, library):
-    """Calibrated deviations (p,) and corrected sim of a row of `withheld_states`, and its effects by name.
+    """Calibrated deviations (p,), State of the corrected model and its effects by name from a row of `withheld_states`.
 
-    library: effects by name, from which those are made that a campaign has chosen the waves of.
+    library: effects by name; those with waves that a campaign has chosen are made from them.
     """
-    told = {key: json.loads(row[key]) for key in ("calibrated", "deviations", "fitted_effects", "shapes")}
-    effects = {(name, shape): np.array(value) for name, shape, value, _ in told["fitted_effects"]}
-    laws = {name: _as_fitted(library[name], len(value), waves) for name, _, value, waves in told["fitted_effects"]}
-    return np.array(told["calibrated"]), State(np.array(told["deviations"]), effects, told["shapes"]), laws
+    saved = {key: json.loads(row[key]) for key in ("calibrated", "deviations", "fitted_effects", "shapes")}
+    values = {(name, shape): np.array(value) for name, shape, value, _ in saved["fitted_effects"]}
+    effects = {name: _as_fitted(library[name], len(value), waves) for name, _, value, waves in saved["fitted_effects"]}
+    return np.array(saved["calibrated"]), State(np.array(saved["deviations"]), values, saved["shapes"]), effects
 
 
 def _as_fitted(effect, count, waves):
-    """The effect with the waves that were found, or with so many coefficients."""
+    """The effect with the waves that were found, or with that number of coefficients."""
     if waves:
         return effect.with_waves(tuple(map(tuple, waves)))
     return effect if effect.coarser is None else effect.coarser(count)

@@ -1,4 +1,4 @@
-"""The scores of the check on withheld effects in figures, beside what the diagnosis is meant to reach."""
+"""Summary statistics of the scores of the check on withheld effects, compared with the required values."""
 
 import numpy as np
 import pandas as pd
@@ -7,17 +7,17 @@ from rrru.studies.blind_validation import causes as on_causes
 from rrru.studies.blind_validation.chunks import noise_of
 from rrru.studies.blind_validation.verdicts import AS_ROBOTS_ARE, PLANTS, in_order, is_outside
 
-# strength over the noise from which on a cause counts as one that acts
+# least strength over the noise of a cause whose statement is counted
 LEAST_STRENGTH = 0.5
-# bins of equal width of a probability
+# bins of a probability, of equal width
 BIN_EDGES = np.arange(11) / 10.0
-# probabilities of a log loss are at least this far from 0 and 1
+# least distance from 0 and 1 of the probabilities in a log loss
 _LEAST_PROBABILITY = 0.001
 
-# of a calibration error: fewer robots in a bin are off by more than a wrong probability by their number alone
+# bins of a calibration error; with fewer robots per bin, sampling error exceeds the error of a probability
 _BINS, _PER_BIN = 10, 20
 _NEAR = 0.05
-# share of a part's true size that the found one may be off
+# allowed relative error of the found size of a part
 _NEAR_PART = 0.25
 _WITHIN = f"found within {100 * _NEAR_PART:g} %"
 _PREDICTED = f"share closed predicted within {_NEAR:g}"
@@ -28,7 +28,7 @@ _WEAK_GROUP = "one effect, gap 0.3 to 1 x noise"
 _ALL_ACTS = ("none", "one", "two", "outside")
 
 
-# all that `summary` reads of withheld_limits, withheld_parts and withheld_causes
+# columns that `summary` reads of withheld_limits, withheld_parts and withheld_causes
 LIMITS = ["check", "robot", "weakest", "imitated_share"]
 PARTS = ["check", "robot", "part", "kind", "strength", "named"]
 PARTS += ["true_rms_mm", "found_rms_mm", "found_low_mm", "found_high_mm"]
@@ -45,7 +45,7 @@ def wilson(hits, count):
 
 
 def calibration_error(probability, right):
-    """Expected calibration error of stated probabilities (n,) for what was right (n,), in bins of equal counts."""
+    """Expected calibration error of stated probabilities (n,) of correct answers (n,), in bins of equal counts."""
     if not len(right):
         return np.nan
     order = np.argsort(np.asarray(probability, dtype=float), kind="stable")
@@ -56,7 +56,7 @@ def calibration_error(probability, right):
 
 _CALIBRATED = ("all", "expected calibration error", "", None, 0.05)
 _HELD = ("numbers of causes named", "95 % intervals hold the true one", "numbers > 0 and right", "held", 0.9)
-# per check: group, what is counted, which robots (all where empty), column of hits, share asked for or None
+# per check: group, figure, query of its robots (all where empty), column of hits, required share or None
 _LABEL = (
     ("one effect, gap >= 1.5 x noise", "named exactly", _STRONG, "right", 0.98),
     ("nothing acts", "false alarms", "acts == 'none'", "wrong", 0.01),
@@ -74,8 +74,8 @@ _LABEL = (
 )
 _EFFECT = (
     ("all", "unexplained", "", "right", 0.95),
-    ("others imitate less than 0.8 of the gap", "unexplained", "imitated_share < 0.8", "right", None),
-    ("others imitate 0.8 of the gap or more", "unexplained", "not imitated_share < 0.8", "right", None),
+    ("others are confounded with less than 0.8 of the gap", "unexplained", "imitated_share < 0.8", "right", None),
+    ("others are confounded with 0.8 of the gap or more", "unexplained", "not imitated_share < 0.8", "right", None),
     _CALIBRATED,
 )
 _NOISE = (
@@ -85,7 +85,7 @@ _NOISE = (
 )
 _BACKGROUND = (
     ("nothing acts but axis errors", "answered none or joint_axis_error", "acts == 'none'", "right", 0.95),
-    ("one effect besides", "named exactly, with or without joint_axis_error", "acts == 'one'", "right", 0.92),
+    ("one effect and axis errors", "named exactly, with or without joint_axis_error", "acts == 'one'", "right", 0.92),
     _CALIBRATED,
 )
 _OUTSIDE = "acts == 'outside' and strength >= 2"
@@ -113,7 +113,7 @@ _MANY = (("all", "what matters named, nothing that is not there", "", "right", N
 def counted(causes):
     """The rows of `withheld_causes` whose statement is counted.
 
-    The cause makes half of the noise or more by itself, or does not act: of causes that make less no answer is wrong.
+    The cause alone makes half of the noise or more, or does not act. No statement on a weaker acting cause is wrong.
     """
     return causes[~causes["acts"].astype(bool) | (causes["strength"] >= LEAST_STRENGTH)]
 
@@ -152,7 +152,7 @@ def log_loss(probability, acts):
     return float(-np.log(np.where(acts, clipped, 1.0 - clipped)).mean()) if len(acts) else np.nan
 
 
-# statements on single causes: figure, its function of probabilities and what acts, what every check is meant to reach
+# statements on single causes: figure, its function of probabilities and acting causes, required value of every check
 _STATEMENTS = (
     ("expected calibration error", causes_calibration_error, 0.03),
     ("Brier score", brier_score, None),
@@ -160,14 +160,14 @@ _STATEMENTS = (
 )
 _COUNTED = f"causes of {LEAST_STRENGTH:g} x noise or more, or that do not act"
 _LINES = "causes and groups named"
-# how a cause is named: figure and column; `named` is a verdict's effects, the first member of a group among them
+# how a cause is named: figure and column; `named`: among a verdict's effects, which hold the first member of a group
 _NAMED, _IN_PAIR = ("named", "named"), ("named, or in a group of two", "in_pair")
 _NAMES = (_NAMED, _IN_PAIR, ("named, or in a group", "in_group"), ("named alone, no group", "alone"))
 _MAJOR = "causes in the library, 0.3 of the gap or more"
 _LARGEST = "largest cause, where in the library"
 _SIZED = "kind != 'outside' and strength >= 2"
 _COVERED = f"{_WITHIN} or in its 95 % interval"
-# of the parts of the robots' gaps
+# on the parts of the robots' gaps
 _PARTS = (
     *((_MAJOR, figure, "kind == 'effect' and share >= 0.3", column) for figure, column in _NAMES),
     *((_LARGEST, figure, "kind == 'effect' and largest", column) for figure, column in _NAMES),
@@ -180,7 +180,7 @@ _PARTS = (
     ("a cause from outside >= 2 x noise", "unexplained", "kind == 'unexplained' and strength >= 2", "named"),
     ("nothing from outside", "unexplained", "kind == 'unexplained' and strength == 0", "named"),
 )
-# what many causes at once are meant to reach, by group and figure
+# required values of the check many, by group and figure
 _ASKED_OF_MANY = {
     (_MAJOR, _NAMED[0]): 0.92,
     (_MAJOR, _IN_PAIR[0]): 0.96,
@@ -222,9 +222,9 @@ def summary(scores, limits, parts, causes):
         sized=scores["right"] | scores["robot"].isin(_sized(parts)),
     )
     rows = []
-    for check, own in _CHECKS.items():
+    for check, entries in _CHECKS.items():
         robots, listed, stated = (frame[frame["check"] == check] for frame in (scores, parts, causes))
-        found = [_row(robots, *entry) for entry in (*own, *_each(check, robots))] if len(robots) else []
+        found = [_row(robots, *entry) for entry in (*entries, *_each(check, robots))] if len(robots) else []
         if len(robots) and len(listed):
             seen, asked = _seen(listed, robots, stated), _ASKED_OF_MANY if check == "many" else {}
             found += [_row(seen, *entry, asked.get(entry[:2])) for entry in _PARTS]
@@ -234,9 +234,9 @@ def summary(scores, limits, parts, causes):
 
 
 def _on_causes(causes, asked):
-    """Rows on the statements about single causes and on the causes and groups that are named; asked: by _LINES."""
+    """Rows on statements about single causes and on named causes and groups; asked: required values."""
     some, lines = counted(causes), on_causes.named_lines(causes)
-    figures = [(name, of(some["probability"], some["acts"]), wanted) for name, of, wanted in _STATEMENTS]
+    figures = [(name, score(some["probability"], some["acts"]), wanted) for name, score, wanted in _STATEMENTS]
     groups = lines[lines["size"] > 1]
     return [
         *(_plain(_COUNTED, name, len(some), value, wanted) for name, value, wanted in figures),
@@ -246,12 +246,12 @@ def _on_causes(causes, asked):
 
 
 def _sized(parts):
-    """Names of robots whose unexplained part is found nearly as large as it is."""
+    """Names of robots whose unexplained part is found with a size near the true one."""
     return parts.loc[(parts["kind"] == "unexplained") & (parts["strength"] > 0.0) & _near(parts), "robot"]
 
 
 def _near(parts):
-    """Which parts are found nearly as large as they are."""
+    """Which parts are found with a size near the true one."""
     return (parts["found_rms_mm"] - parts["true_rms_mm"]).abs() <= _NEAR_PART * parts["true_rms_mm"]
 
 
@@ -261,9 +261,9 @@ def _each(check, robots):
         for file in sorted(robots["file"].unique()):
             yield file or "3-RRRU", _MANY[0][1], f"file == '{file}'", "right", None
     if check in PLANTS:
-        for cause, own in robots.groupby("cause"):
+        for cause, with_cause in robots.groupby("cause"):
             yield cause, "right", f"cause == '{cause}'", "right", None
-            if (own["strength"] >= _SEEN).any():
+            if (with_cause["strength"] >= _SEEN).any():
                 yield (
                     f"{cause}, gap >= 1.5 x noise",
                     "right",
@@ -275,22 +275,22 @@ def _each(check, robots):
             yield file, "right", f"file == '{file}'", "right", None
     if check == "label":
         for effect in sorted(robots.query("acts == 'one'")["truth"].unique()):
-            of_it = f"truth == '{effect}'"
-            yield f"{effect} alone, gap >= 1.5 x noise", "named exactly", f"{_STRONG} and {of_it}", "right", None
-            yield f"{effect} alone", "named exactly", of_it, "right", None
+            which = f"truth == '{effect}'"
+            yield f"{effect} alone, gap >= 1.5 x noise", "named exactly", f"{_STRONG} and {which}", "right", None
+            yield f"{effect} alone", "named exactly", which, "right", None
     if check == "effect":
         for effect in sorted(robots["truth"].unique()):
             yield effect, "unexplained", f"truth == '{effect}'", "right", None
     if check == "noise":
         for noise in robots["noise"].unique():
-            of_it = f"noise == '{noise}'"
-            nothing, one = (f"acts == '{acts}' and {of_it}" for acts in ("none", "one"))
+            which = f"noise == '{noise}'"
+            nothing, one = (f"acts == '{acts}' and {which}" for acts in ("none", "one"))
             yield f"nothing acts, {noise}", "named or unexplained", nothing, "wrong", 0.05
             yield f"one effect, {noise}", "named exactly", one, "right", 0.92
 
 
 def _seen(parts, robots, causes):
-    """Parts of robots' gaps with what is counted of them."""
+    """Parts of robots' gaps with the columns that the summary counts."""
     parts = on_causes.with_decisions(parts, causes)
     whole = parts["robot"].map(robots.set_index("robot")["strength"])
     acting = parts[parts["kind"].isin(["effect", "outside"]) & (parts["strength"] > 0.0)]
@@ -305,27 +305,27 @@ def _seen(parts, robots, causes):
 
 
 def _row(robots, group, counted, which, column, asked):
-    """One row: the share of hits with its interval, or where there is no column the calibration error."""
+    """One row: the share of hits with its interval, or without a column the calibration error."""
     if which:
         robots = robots.query(which)
     if column is None:
         return _plain(group, counted, len(robots), calibration_error(robots["probability"], robots["right"]), asked)
     hits = robots[column].dropna().astype(float)
-    # of its numbers a robot has several
+    # a robot has several numbers
     count = int(robots["numbers"].sum()) if column == "held" else len(hits)
     low, high = wilson(hits.sum(), count)
     return _plain(group, counted, count, hits.sum() / count if count else np.nan, asked) | {"low": low, "high": high}
 
 
 def _plain(group, counted, count, value, asked=None):
-    """One row of a figure that is no share."""
+    """One row of a figure that is not a share."""
     asked = np.nan if asked is None else asked
     row = {"group": group, "figure": counted, "robots": count, "value": float(value)}
     return row | {"low": np.nan, "high": np.nan, "asked": asked}
 
 
 def _acts(truth):
-    """How much acts: none, one, two or outside."""
+    """Class of the truth: none, one, two or outside."""
     if is_outside(truth):
         return "outside"
     return "none" if truth == "none" else "two" if "+" in truth else "one"

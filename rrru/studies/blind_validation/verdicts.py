@@ -1,15 +1,15 @@
-"""Verdicts beside the truth: whether they are right."""
+"""Whether verdicts are correct, given the truth."""
 
 PREFIX = "outside"
 UNEXPLAINED, NONE = "unexplained", "none"
 # checks on robots of files, each the name of the plant that drives them
 PLANTS = ("mujoco", "own")
 AS_ROBOTS_ARE = "as_robots_are"
-# checks on robots of several causes, whose verdict has to name those that matter
+# checks on robots with several causes; the verdict has to name the important ones
 SEVERAL_CAUSES = ("many", AS_ROBOTS_ARE)
-# kinds of parts of a gap that a verdict names and that may not be there
+# kinds of parts of a gap that a verdict may name wrongly
 CAUSES = ("effect", "background")
-# what acts in every robot of the check on a background, asked for or not
+# effect that acts in every robot of the check on a background
 _BACKGROUND = "joint_axis_error"
 _SCORES = [
     "check",
@@ -28,9 +28,10 @@ _SCORES = [
 
 
 def is_right(truth, verdict, check):
-    """Whether a verdict names the truth; where the library does not hold it, whether it says so.
+    """Whether a verdict names the truth, or says unexplained where the library does not hold the truth.
 
-    On a background of axis errors these may be named or not. For many causes see `rrru.studies.blind_validation.parts`.
+    On a background of axis errors, joint_axis_error may be named or not. For many causes see
+    `rrru.studies.blind_validation.parts`.
     """
     said = set(verdict.split("+"))
     if check == "effect" or is_outside(truth):
@@ -41,20 +42,20 @@ def is_right(truth, verdict, check):
 
 
 def is_outside(truth):
-    """Whether no library holds the truth."""
+    """Whether the truth is outside the library."""
     return truth.startswith((PREFIX, UNEXPLAINED))
 
 
-def scores(told):
-    """Frame `withheld_scores` from rows of `withheld_verdicts` beside the columns of the truth and `right`."""
+def scores(verdicts):
+    """Frame `withheld_scores` from rows of `withheld_verdicts` joined with the columns of the truth and `right`."""
     # a library without the effect cannot name its leg
-    has_leg = (told["truth_leg"] > 0) & (told["check"] != "effect")
-    told = told.assign(
-        verdict=told["effects"],
-        leg_right=(told["leg"] == told["truth_leg"]).astype(float).where(has_leg),
-        share_closed=told["share_closed"].where(~told["effects"].isin([NONE, UNEXPLAINED])),
+    has_leg = (verdicts["truth_leg"] > 0) & (verdicts["check"] != "effect")
+    verdicts = verdicts.assign(
+        verdict=verdicts["effects"],
+        leg_right=(verdicts["leg"] == verdicts["truth_leg"]).astype(float).where(has_leg),
+        share_closed=verdicts["share_closed"].where(~verdicts["effects"].isin([NONE, UNEXPLAINED])),
     )
-    return told[[*_SCORES, "oracle_detects", "share_closed_true", "share_closed", "numbers", "held"]]
+    return verdicts[[*_SCORES, "oracle_detects", "share_closed_true", "share_closed", "numbers", "held"]]
 
 
 def in_order(effects):

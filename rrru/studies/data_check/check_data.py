@@ -1,4 +1,4 @@
-"""What is in a file of measurements, what will be used, what is missing and costs, and the overlay to paste.
+"""Check of a file of measurements: its contents, used columns, missing data and their effects, and an overlay to paste.
 
 python -m rrru.studies.data_check.check_data FILE --robot rrru3 [--commands FILE] [--configfile mine.yaml]
 """
@@ -21,17 +21,17 @@ from rrru.studies.data_check.costs import costs, without_times
 from rrru.studies.data_check.propose import fitting_robots, propose
 
 _SHOWN = 8
-# a line of the overlay that is longer becomes several
+# longest line of the overlay
 _WIDE = 110
 _UNFINISHED = (
-    "NOT ACCEPTED YET: a run refuses the file for what is listed above. Mend that first; so far the overlay is:"
+    "NOT ACCEPTED YET: a run refuses the file for the problems above. Correct these first; so far the overlay is:"
 )
-# what only the user knows, with an example
+# values that only the user knows, with an example
 _UNREADABLE = {
-    "noise_mm": "0.02  # of the instrument, 1 sigma per axis; as it stands, the file tells it or it is estimated",
-    "platform_mass_kg": "3.0  # what the robot carries beside payload_kg: the platform or tool",
+    "noise_mm": "0.02  # of the instrument, 1 sigma per axis; without it, it is read from the file or estimated",
+    "platform_mass_kg": "3.0  # mass of platform or tool, without payload_kg",
 }
-# what only the user knows of a robot that stops
+# motion of a robot that stops, which only the user knows
 _BETWEEN = (
     "motion: {kind: stop_and_go, between: drives}  # it moves from stop to stop joint by joint (PTP); "
     "tool: in straight lines (LIN)"
@@ -41,10 +41,10 @@ _OPTIONAL = ("time_s", "speed_mm_s", "payload_kg")
 
 @dataclass(frozen=True)
 class Check:
-    """What was found of a file.
+    """The result for a file.
 
-    section: the campaign's section that is proposed; lines: what is said of it; refused: the problems that stay with
-    it, empty where ingest takes the file.
+    section: the proposed section of the campaign; lines: the report; refused: the remaining problems, empty where
+    ingest accepts the file.
     """
 
     section: dict
@@ -59,18 +59,18 @@ class Check:
     @property
     def name(self):
         """A name for the campaign."""
-        return "".join(one if one.isalnum() or one in "_-" else "_" for one in Path(self.section["ingest"]).stem)
+        return "".join(sign if sign.isalnum() or sign in "_-" else "_" for sign in Path(self.section["ingest"]).stem)
 
 
 def check_file(file, config, robot=None, commands=None):
     """The Check of a file for a robot of the configuration.
 
-    A campaign of the configuration with this file is taken as it stands, and what it lacks is proposed. Raises
-    IngestError for a file that cannot be read and ConfigError for a robot that does not exist.
+    A campaign of the configuration with this file is used unchanged, with proposals for its missing keys. Raises
+    IngestError for a file that cannot be read and ConfigError for an unknown robot.
     """
     section = next((one for one in config["campaigns"].values() if one.get("ingest") == str(file)), {})
-    told = {key: value for key, value in (("robot", robot), ("commands", commands)) if value}
-    given = {"robot": None, "ingest": str(file)} | section | told
+    arguments = {key: value for key, value in (("robot", robot), ("commands", commands)) if value}
+    given = {"robot": None, "ingest": str(file)} | section | arguments
     if given["robot"] not in config["robots"]:
         named = f"robot is {given['robot']!r}" if given["robot"] else "say which robot: ROBOT=.. (--robot ..)"
         known = f"allowed: {', '.join(config['robots'])}, or one of your own with CONFIG=.. (--configfile ..)"
@@ -92,14 +92,14 @@ def check_file(file, config, robot=None, commands=None):
 
 
 def _content(section, cells):
-    """What the file is."""
+    """The file, its size and its format."""
     kind = section.get("format") or "as its ending says"
     more = f", commands from {section['commands']}" if "commands" in section else ""
     return f"{section['ingest']}: {len(cells.rows)} rows, {len(cells.names)} columns, format {kind}{more}"
 
 
 def _used(section, cells, mechanism):
-    """Which columns are used as what, left out, missing."""
+    """The used, unused and missing columns."""
     spec = replace(IngestSpec.from_config(section), extra_columns="ignore")
     found, extra = resolve(spec, cells, mechanism, Problems(spec.path))
     same = [ours for ours, theirs in found.items() if ours == theirs]
@@ -115,7 +115,7 @@ def _used(section, cells, mechanism):
         yield f"missing, and needed: {', '.join(missing)}"
     if any(name.startswith("command") for name in missing):
         other = f"the drives' values ({', '.join(mechanism.parts.columns)})"
-        yield f"where the robot was sent stands in no column: give a second file with --commands, or {other}"
+        yield f"no column has the commanded positions: give a second file with --commands, or {other}"
     yield from _meant(found, mechanism)
     optional = [ours for ours in _OPTIONAL if ours not in found]
     if optional:
@@ -123,7 +123,7 @@ def _used(section, cells, mechanism):
 
 
 def _meant(found, mechanism):
-    """What commanded positions and payloads are of."""
+    """Reference points of commanded positions and payloads."""
     tool = f"the tool, {position_text(mechanism.tool_mm)} on the platform"
     if set(COMMAND) <= set(found):
         others = ", whatever target a row is of" if "target" in found else ""
@@ -133,7 +133,7 @@ def _meant(found, mechanism):
 
 
 def read_config(overlays, base="config.yaml"):
-    """The configuration under overlays; raises ConfigError for what is no YAML mapping."""
+    """The configuration under overlays; raises ConfigError for a file that is not a YAML mapping."""
     config = {}
     check_keys((base, *overlays))
     for file in (base, *overlays):
@@ -148,7 +148,7 @@ def read_config(overlays, base="config.yaml"):
 
 
 def _merged(below, above):
-    """A mapping under another one."""
+    """A mapping with the entries of another one on top."""
     both = {
         key: _merged(below[key], value) if isinstance(value, dict) and isinstance(below.get(key), dict) else value
         for key, value in above.items()
@@ -157,7 +157,7 @@ def _merged(below, above):
 
 
 def main(arguments=None):
-    """Print the check of a file; the exit code is 1 where ingest would refuse it, 2 where there is nothing to say."""
+    """Print the check of a file; the exit code is 1 where ingest would refuse it, 2 where there is no result."""
     parser = argparse.ArgumentParser(prog="check_data", description=__doc__.splitlines()[0])
     parser.add_argument("file")
     parser.add_argument("--robot", help="entry of robots: in the configuration")
@@ -184,7 +184,7 @@ def main(arguments=None):
 
 
 def _pasted(found):
-    """The overlay as text, with what nobody can read from a file as comments."""
+    """The overlay as text, with the values that no file has as comments."""
     lines = ["campaigns:", f"  {yaml.safe_dump(found.name).splitlines()[0]}:"]
     for key, value in found.section.items():
         short, long = (

@@ -1,4 +1,4 @@
-"""What a campaign cannot tell, from its columns and its motion alone, before anything is fitted."""
+"""What a campaign cannot determine, from its columns and its motion alone, before any fit."""
 
 import numpy as np
 
@@ -14,11 +14,11 @@ from rrru.kinematics.dynamics import Masses
 from rrru.studies import config as parts
 from rrru.studies import setup
 
-# a drive that comes from one side at all but this share of the points is always driven the same way
+# share of points from the other side below which a drive counts as always approached from one side
 _ONE_WAY = 0.02
-# names of numbers that are listed
+# most names of parameters that are listed
 _SHOWN = 8
-# what gives what an effect needs
+# remedies by the missing input of an effect
 _REMEDIES = {
     "time_s": "a column time_s, in seconds or times of day",
     "drive_rate": "a column time_s on runs along a path that is passed without stops",
@@ -28,7 +28,7 @@ _REMEDIES = {
 
 
 def costs(measurements, config, section):
-    """Sentences on what measurements of a campaign's section of the configuration cannot tell; empty for nothing."""
+    """Sentences on what the measurements of a campaign's section cannot determine; empty for no such limit."""
     nominal = parts.robot(config, section)
     said = [*_readings(measurements, setup.mechanism(nominal), section), *_passes(measurements, section)]
     try:
@@ -48,41 +48,41 @@ def costs(measurements, config, section):
 
 
 def _poses(case):
-    """How many poses the calibration needs."""
+    """Sentence on the number of poses that the calibration needs."""
     rank, needed, read = poses_needed(case)
-    spare = f"{OPTIONS.min_spare_numbers} numbers to spare"
-    return f"{read} poses are read; {rank} parameters that these tell apart need at least {needed}, with {spare}"
+    spare = f"{OPTIONS.min_spare_numbers} degrees of freedom to spare"
+    return f"{read} poses are read; their {rank} identifiable parameters need at least {needed}, with {spare}"
 
 
 def without_times(config, mechanism):
-    """Sentences on what no diagnosis of a robot sees in a file without times."""
+    """Sentences on effects of a robot that are not testable in a file without times."""
     library = GapSettings.from_config(config["gap"]).library(mechanism)
     names = [name for name, effect in library.items() if {"time_s", "drive_rate"} & set(effect.needs)]
-    return [f"cannot be seen without times: {', '.join(names)}; {_REMEDIES['time_s']} would show them"] if names else []
+    return [f"not testable without times: {', '.join(names)}; add {_REMEDIES['time_s']}"] if names else []
 
 
 def _numbers(nominal, robot):
-    """Numbers of the robot that the poses do not tell from the others."""
-    told = set(robot.parameters.names)
-    lost = [name for name in setup.mechanism(nominal).parameters.names if name not in told]
+    """Sentence on the robot's parameters that are not identifiable from the poses."""
+    identifiable = set(robot.parameters.names)
+    lost = [name for name in setup.mechanism(nominal).parameters.names if name not in identifiable]
     if lost:
         more = f" and {len(lost) - _SHOWN} more" if len(lost) > _SHOWN else ""
-        yield f"these poses do not tell {', '.join(lost[:_SHOWN])}{more}: left out of the calibration"
+        yield f"not identifiable from these poses: {', '.join(lost[:_SHOWN])}{more}; the calibration fixes them"
 
 
 def _untested(case):
-    """Effects that lack what they need, by the reason."""
+    """Sentences on effects that are not testable, by the reason."""
     reasons = {}
     for name, reason in case.untestable.items():
         reasons.setdefault(reason, []).append(name)
     for reason, names in reasons.items():
         needs = [remedy for need, remedy in _REMEDIES.items() if need in reason]
-        remedy = f"; {' and '.join(needs)} would show them" if needs else ""
-        yield f"cannot be seen: {', '.join(names)} ({reason}){remedy}"
+        remedy = f"; add {' and '.join(needs)}" if needs else ""
+        yield f"not testable: {', '.join(names)} ({reason}){remedy}"
 
 
 def _one_way(case):
-    """Drives that come to every point from the same side."""
+    """Sentence on drives that approach every point from the same side."""
     motion = case.motion
     before = motion.path_drive[np.maximum(motion.path_index - 1, 0)]
     known = np.isfinite(motion.last_move).all(axis=1)
@@ -94,27 +94,28 @@ def _one_way(case):
         if min(one, other) < _ONE_WAY
     ]
     if same:
-        yield f"always approached from one side: {', '.join(same)}; play there looks like an offset: drive back, too"
+        drives = ", ".join(same)
+        yield f"always approached from one side: {drives}; backlash is confounded with an offset: also drive back"
 
 
 def _passes(measurements, section):
-    """What never comes back: places at other times, noise, payloads."""
+    """Sentences on missing repetitions: places at other times, noise, payloads."""
     command = measurements[["command_x_mm", "command_y_mm", "command_z_mm"]].round(3)
     runs = measurements["run"].groupby([*command.to_numpy().T]).nunique()
     if not (runs > 1).any():
-        yield "no place is measured in two runs: what drifts cannot be told from what depends on the place"
+        yield "no place is measured in two runs: drift is confounded with effects of the place; repeat a run"
     stated = "noise_mm" in section or read_noise(measurements) is not None
     if not stated and repeat_noise(measurements)[1] < ENOUGH_REPEATS:
-        yield "nobody states the noise and hardly a point is repeated: what is rough along the runs counts as noise"
+        yield "noise_mm is not stated and hardly a point is repeated: rough errors along the runs count as noise"
     if measurements["payload_kg"].nunique() < 2:
-        mass = "" if "platform_mass_kg" in section else ", whose platform_mass_kg nobody states"
-        yield f"one payload: what bends is seen under the robot's own weight alone{mass}"
+        mass = "" if "platform_mass_kg" in section else "; platform_mass_kg is not stated"
+        yield f"one payload: compliance shows under the robot's own weight only{mass}"
 
 
 def _readings(measurements, robot, section):
-    """What positions of one point leave open on robots that turn their platform."""
-    one = "target" not in measurements or measurements["target"].nunique() < 3
-    if robot.orients and one and not rows.has_turns(measurements):
-        yield "no orientations and fewer than three reflectors: what only turns the tool about its point is not seen"
+    """Sentences on what positions of one point do not determine on robots that rotate their platform."""
+    few_targets = "target" not in measurements or measurements["target"].nunique() < 3
+    if robot.orients and few_targets and not rows.has_turns(measurements):
+        yield "no orientations and fewer than three reflectors: pure rotations of the tool about its point do not show"
     if section.get("frame") == "register":
-        yield "frame: register, solved from the robot's own points: where its base stands is not told"
+        yield "frame: register is solved from the robot's own points: the pose of its base is not determined"

@@ -1,4 +1,4 @@
-"""What a campaign's section lacks for its file to be read: found by trying, for the user to accept."""
+"""Missing keys of a campaign's section, found by trial, for the user to accept."""
 
 from dataclasses import dataclass, replace
 from itertools import product
@@ -24,16 +24,18 @@ from rrru.kinematics.robot import Robot
 from rrru.studies import config as parts
 from rrru.studies import setup
 
-# points that tell whether a file is of a robot
+# number of points for the test whether a file is of a robot
 _PROBES = 20
-# share of them that a robot has to reach
-_MOST = 0.9
+# least share of them that a robot has to reach
+_MIN_REACHED = 0.9
 
 
 @dataclass(frozen=True)
 class Proposal:
-    """section: the campaign's section with what was found; cells: of the file; mechanism: the robot; result: what
-    ingest makes of it, None where it is refused; refused: its problems.
+    """A proposal for a campaign's section.
+
+    section: with the found keys; cells: of the file; mechanism: the robot; result: of ingest, None where it is refused;
+    refused: its problems.
     """
 
     section: dict
@@ -51,7 +53,7 @@ def propose(section, config):
 
 
 def _with_motion(found):
-    """The Proposal with a `motion` that nobody states: stop and go where several targets were read at a stop, or the
+    """The Proposal with a `motion` where none is stated: stop and go where several targets were read at a stop, or the
     points follow no path.
     """
     if found.result is None or "motion" in found.section:
@@ -64,8 +66,10 @@ def _with_motion(found):
 
 
 def fitting_robots(section, config):
-    """Names of the robots of the configuration that the file of a section may be of, the named one alone if it is:
-    those whose drive values bring them where it says, or which reach its commanded positions where it has no drives.
+    """Names of the configuration's robots that fit the file of a section; the named one alone if it fits.
+
+    A robot fits if its actuator positions give the commanded positions, or if it reaches these where the file has no
+    actuator positions.
     """
     section = _with_formats(section)
     machines = {name: setup.mechanism(parts.robot(config, {"robot": name})) for name in config["robots"]}
@@ -99,7 +103,7 @@ def _with_format(section, key, name):
 
 
 def _with_columns(section, mechanism):
-    """Cells of the file, and the section with the columns that look like ours."""
+    """Cells of the file, and the section with the guessed columns."""
     spec = IngestSpec.from_config(section)
     problems = Problems(spec.path)
     cells = read_cells(Path(spec.path), spec.format, problems)
@@ -127,15 +131,15 @@ def _found(section, cells, mechanism):
 
 
 def _fitting(section, cells, mechanism):
-    """The parts of a Proposal under the first units and frame under which ingest takes the file.
+    """The parts of a Proposal with the first units and frame for which ingest accepts the file.
 
-    Units and frame that are stated stay; those in the file's header are tried first. Where none fits the section has
-    those of the first attempt with the fewest problems of the whole file; what only single rows have no unit mends.
+    Stated units and frame stay; those in the file's header are tried first. Where none fits, the section has those of
+    the first attempt with the fewest problems of whole columns; a unit does not affect problems of single rows.
     """
     choices = {"frame": ("robot", "register"), "unit": tuple(MM), "angle_unit": tuple(RAD)}
     usual = {key: values[0] for key, values in choices.items()}
-    told = guess_units(cells, _found(section, cells, mechanism)[0], mechanism)
-    choices |= {key: tuple(dict.fromkeys((unit, *choices[key]))) for key, unit in told.items()}
+    guessed = guess_units(cells, _found(section, cells, mechanism)[0], mechanism)
+    choices |= {key: tuple(dict.fromkeys((unit, *choices[key]))) for key, unit in guessed.items()}
     open_choices = [((section[key],) if key in section else values) for key, values in choices.items()]
     attempts = []
     for values in product(*open_choices):
@@ -145,14 +149,14 @@ def _fitting(section, cells, mechanism):
             return stated, cells, mechanism, ingest(IngestSpec.from_config(stated), mechanism), ()
         except IngestError as error:
             attempts.append((stated, cells, mechanism, None, error.problems))
-        if all(one["row"] is not None for one in attempts[-1][-1]):
+        if all(problem["row"] is not None for problem in attempts[-1][-1]):
             break
     return min(attempts, key=lambda attempt: _of_all_rows(attempt[-1]))
 
 
 def _of_all_rows(problems):
-    """How many problems are of all rows of a column: another unit or frame, not single cells."""
-    return sum(one["row"] is None and one["column"] is not None for one in problems)
+    """Number of problems of whole columns: another unit or frame, not single cells."""
+    return sum(problem["row"] is None and problem["column"] is not None for problem in problems)
 
 
 def _belongs(section, mechanism, drives):
@@ -161,25 +165,27 @@ def _belongs(section, mechanism, drives):
         cells, section = _with_columns(_of_robot(section, mechanism), mechanism)
         found, spec = _found(section, cells, mechanism)
         every = max(len(cells.rows) // _PROBES, 1)
-        few = replace(cells, rows=cells.rows[::every], cells={n: own[::every] for n, own in cells.cells.items()})
+        few = replace(
+            cells, rows=cells.rows[::every], cells={name: values[::every] for name, values in cells.cells.items()}
+        )
         frame = convert(spec, mechanism, found, few, Problems(spec.path))
     except RrruError:
         return False
     if not set(COMMAND) <= set(frame):
         return set(mechanism.parts.columns) <= set(frame)
     stated = section.get("unit"), section.get("angle_unit")
-    units = [MM[one] / MM[spec.unit] for one in ((stated[0],) if stated[0] else MM)]
-    angles = [RAD[one] / RAD[spec.angle_unit] for one in ((stated[1],) if stated[1] else RAD)]
+    units = [MM[unit] / MM[spec.unit] for unit in ((stated[0],) if stated[0] else MM)]
+    angles = [RAD[unit] / RAD[spec.angle_unit] for unit in ((stated[1],) if stated[1] else RAD)]
     if set(mechanism.parts.columns) <= set(frame):
         return any(_driven_there(frame, mechanism, unit, angle) for unit, angle in product(units, angles))
     if mechanism.orients or drives & set(cells.names):
         return False
     reached = (np.isfinite(mechanism.inverse(unit * rows.command(frame))).all(axis=1).mean() for unit in units)
-    return any(share > _MOST for share in reached)
+    return any(share > _MIN_REACHED for share in reached)
 
 
 def _driven_there(frame, mechanism, unit, angle):
-    """Whether drive values bring a robot to the commanded positions, angles and lengths times factors."""
+    """Whether actuator positions give the commanded positions, angles and lengths times factors."""
     factors = [angle if one == "rad" else unit for one in mechanism.parts.units]
     command = unit * rows.command(frame)
     driven = mechanism.forward(frame[[*mechanism.parts.columns]].to_numpy() * factors, guess_mm=command)
@@ -187,7 +193,7 @@ def _driven_there(frame, mechanism, unit, angle):
 
 
 def _of_robot(section, mechanism):
-    """The section with those columns alone that a robot may have."""
+    """The section with only those columns that a robot may have."""
     if "columns" not in section:
         return section
     known = known_columns(mechanism)

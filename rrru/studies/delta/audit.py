@@ -1,6 +1,6 @@
-"""Paper C's claims and contradictions, recomputed, and what its scan has lost.
+"""Paper C's claims and contradictions, recomputed, and the lost parts of its scan.
 
-The paper gives no dimensions: Delta's nominal ones stand in.
+The paper gives no dimensions: Delta's nominal ones are used instead.
 """
 
 from itertools import combinations
@@ -99,13 +99,13 @@ def _conditions():
 
 @finding(
     *_CONCLUSION,
-    "differences between the zero errors mostly shift the whole plane, which distances do not see: "
-    "the position is off {2:.0f} times as far as the distances",
+    "differences between the zero errors mostly shift the whole plane, which does not affect distances: "
+    "the error of the position is {2:.0f} times that of the distances",
     "mm",
     lambda stretch, shift, _: shift > stretch,
 )
 def _least_seen():
-    """Rms change for the least seen combination of zero errors, 1 mm at the arms' ends: of the distances, and of the
+    """Rms change for the least observable zero errors, 1 mm at the arms' ends: of the distances, and of the
     position.
     """
     position, _, distance = _planar_jacobians()
@@ -126,7 +126,7 @@ def _checked_jacobians():
 @finding(
     "eq. (3), text",
     "errors of l1 and l2 can be neglected",
-    f"the zero errors cannot take them up; a mean of {_PRINTED['after_mean']} mm is left, "
+    f"the zero errors cannot absorb them; a mean of {_PRINTED['after_mean']} mm remains, "
     "which zero errors alone do not explain",
     "mm",
     lambda exact, left: left > 1e-3 > exact,
@@ -136,8 +136,8 @@ def _left_by_lengths():
     and a.
     """
     zeros, lengths = _checked_jacobians()
-    kept = lengths - zeros @ np.linalg.lstsq(zeros, lengths, rcond=None)[0]
-    return 0.0, 0.1 * np.sqrt((kept**2).sum() / (len(kept) / 3))
+    remaining = lengths - zeros @ np.linalg.lstsq(zeros, lengths, rcond=None)[0]
+    return 0.0, 0.1 * np.sqrt((remaining**2).sum() / (len(remaining) / 3))
 
 
 @finding(

@@ -18,7 +18,7 @@ def calibrate_camera(images, lattice):
 def find_centres(images, planes, command_mm, model, lattice):
     """Rows of `delta_centres` and `delta_dots` from images (n, height, width) of the poses and a calibrated camera.
 
-    planes (n,), command_mm (n, 3): as the poses were commanded.
+    planes (n,), command_mm (n, 3): of the commanded poses.
     """
     seen = [vision.read_dots(image, f"pose {k}") for k, image in enumerate(images, 1)]
     poses = vision.camera_poses(model, seen, lattice)
@@ -49,7 +49,7 @@ def camera_numbers(model):
 
 
 def pose_errors(centres, truth):
-    """Rows of `delta_poses`: centres found in the images against the true ones, the origin's shift taken off."""
+    """Rows of `delta_poses`: centres found in the images minus the true ones, without the origin's common shift."""
     rows = centres[["pose", "plane", *vector_columns("command", np.empty((0, 3))), "dots", "reprojection_rms_px"]]
     for prefix, name in (("error", "centre"), ("one_rotation_error", "one_rotation")):
         error = vectors(centres, name) - vectors(truth, "true")

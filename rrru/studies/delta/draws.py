@@ -1,8 +1,8 @@
-"""The optical centres' errors drawn anew without rendering: another plate, other tilted views, other pixel noise.
+"""New random errors of the optical centres without rendering: another plate, other tilted views, other pixel noise.
 
-One plate's dots give one set of errors, which all poses share in part; another plate gives others. Where the lens puts
-the dots is computed exactly, the noise of their centres is the one that the configured images show, and camera and
-poses are calibrated from them as from images. Lengths in mm, angles in rad.
+The dots of a plate give one set of errors, partly common to all poses; another plate gives others. The images of the
+dots are computed exactly, the noise of their centres is that of the configured images, and camera and poses are
+calibrated from them as from images. Lengths in mm, angles in rad.
 """
 
 import numpy as np
@@ -14,24 +14,24 @@ from rrru.studies.delta import vision
 from rrru.studies.delta.views import scene
 from rrru.studies.delta.virtual_delta import twin
 
-# pixels of bright plate that a dot needs between itself and the image's edge to count as whole
+# least distance in pixels between a complete dot and the image's edge
 _EDGE_PX = 5.0
 
 
 def centre_noise_px(config, truth, dots):
-    """RMS per axis of the dots' centres in `delta_dots` off where the configured lens puts the configured plate's."""
+    """RMS error per axis of the dots' centres in `delta_dots` relative to the configured lens and plate."""
     view, seen = scene(config), dots.groupby("pose")
     steps = []
     for pose, place in zip(truth["pose"], view.pose_places(truth), strict=True):
-        own = seen.get_group(pose)[["x_px", "y_px"]].to_numpy()
-        distance, _ = cKDTree(seen_dots(view, *place).centre_px).query(own)
-        # dots at the image's edge that only one of both counts as whole are as far away as a neighbour
+        found = seen.get_group(pose)[["x_px", "y_px"]].to_numpy()
+        distance, _ = cKDTree(seen_dots(view, *place).centre_px).query(found)
+        # excludes dots at the image's edge that only one of both counts as complete
         steps.append(distance[distance < 1.0])
     return float(np.sqrt((np.concatenate(steps) ** 2).mean() / 2.0))
 
 
 def seen_dots(view, rotation, translation_mm, noise_px=0.0, generator=None):
-    """Dots of the scene's target as the camera sees them whole, numbered from the first dot.
+    """Complete dots of the scene's target in the camera's image, numbered from the first dot.
 
     rotation (3, 3), translation_mm (3,): from the target's frame to the camera's. noise_px: 1 sigma per axis.
     """
@@ -57,10 +57,10 @@ def drawn_errors(config, truth, noise_px, count, label):
     size, lattice = (camera.width_px, camera.height_px), vision.Lattice(target.pitch_mm, target.diameter_mm)
 
     def draw(number):
-        own, generator = view.with_plate(robot.generator("target", label, number)), robot.generator(label, number)
-        tilted = [seen_dots(own, *place, noise_px, generator) for place in own.tilted_places(generator)]
+        drawn, generator = view.with_plate(robot.generator("target", label, number)), robot.generator(label, number)
+        tilted = [seen_dots(drawn, *place, noise_px, generator) for place in drawn.tilted_places(generator)]
         model = vision.calibrate_camera(tilted, size, lattice)
-        seen = [seen_dots(own, *place, noise_px, generator) for place in own.pose_places(truth)]
+        seen = [seen_dots(drawn, *place, noise_px, generator) for place in drawn.pose_places(truth)]
         return {
             name: np.array([pose.centre_mm for pose in poses]) - vectors(truth, "true")
             for name, poses in vision.camera_poses(model, seen, lattice).items()

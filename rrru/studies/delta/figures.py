@@ -1,4 +1,4 @@
-"""The Delta's zero calibration by vision: what the camera sees, errors on the plane, and what the variants can tell."""
+"""Figures of the Delta's zero calibration by vision: images, errors on the plane, observability by variant."""
 
 import numpy as np
 import pandas as pd
@@ -34,8 +34,8 @@ _FOUND = {"color": style.ORANGE, "marker": "+", "markersize": 4.0, "linestyle": 
 
 @style.printed
 def delta_images(tables, options):
-    """What the Delta's camera sees (paper C, Figs. 3 and 6). (a) The image of the first pose with the centres of
-    the dots found. (b) Dots that any image shows whole, those of (a) in colour, and the optical centres with their
+    """Images of the Delta's camera (paper C, Figs. 3 and 6). (a) The image of the first pose with the centres of the
+    detected dots. (b) Dots that are complete in any image, those of (a) in colour, and the optical centres with their
     errors, magnified as stated.
     """
     dots, poses = _rows(tables, "delta_dots", "delta_images"), _rows(tables, "delta_poses", "delta_images")
@@ -85,7 +85,7 @@ def _pitch(dots, centres):
 def delta_errors(tables, options):
     """Errors on the plane before and after the paper's calibration (paper C, Figs. 7 and 8): colour is the size of
     the error in the calibration frame, arrows its part in the plane, magnified as stated. Below, mean and largest
-    error under every variant, and the range of the mean when plate, views and noise are drawn anew, (c) in the
+    error of every variant, and the range of the mean over draws of plate, views and noise, (c) in the
     calibration frame, (d) in the frame of the robot's base.
     """
     names = ("delta_points", "delta_calibrations", "delta_draws")
@@ -151,7 +151,7 @@ def _name_rows(axes, variants, title):
 
 @style.printed
 def delta_observability(tables, options):
-    """What every variant sees of the three zero errors: all drives alike (common) and against each other
+    """Observability of the three zero errors by variant: equal errors of all drives (common) and their differences
     (differential). (a) Singular value. (b) Standard error. (c) Error per unknown length error of 1 mm.
     """
     rows = _rows(tables, "delta_observability", "delta_observability")
@@ -159,7 +159,7 @@ def delta_observability(tables, options):
     figure = style.new(style.DOUBLE_MM, 24.0 + 5.4 * len(names))
     panels = figure.subplots(1, 3, sharey=True)
     columns = {
-        "singular_value": ("(a) seen", "singular value (mm/mm)", 1.0),
+        "singular_value": ("(a) observability", "singular value (mm/mm)", 1.0),
         "standard_error_rad": ("(b) uncertainty", "standard error (mrad)", 1e3),
         "per_length_rad_mm": ("(c) length errors", "error per length (mrad/mm)", 1e3),
     }

@@ -1,4 +1,4 @@
-"""The zero calibrations of the Delta as tables: what every variant finds, sees and leaves. mm and rad."""
+"""The zero calibrations of the Delta as tables: estimates, observability and residuals by variant. mm and rad."""
 
 import numpy as np
 import pandas as pd
@@ -13,9 +13,9 @@ _BEFORE = {"variant": "none", "source": "none", "measure": "none", "planes": "no
 
 
 def study(twin, seen, length_error_mm):
-    """Rows of `delta_calibrations`, `delta_observability` and `delta_points` for every variant, and before any.
+    """Rows of `delta_calibrations`, `delta_observability` and `delta_points` for every variant, and before calibration.
 
-    seen: `Seen`; length_error_mm: 1 sigma of every length's error that nobody knows of, for what it does to the zeros.
+    seen: `Seen`; length_error_mm: 1 sigma of every length's unknown error, for the bias of the zeros.
     """
     points, directions = [_points(twin, "none", None)], []
     calibrations = [_BEFORE | _sizes(points[0])]
@@ -24,7 +24,7 @@ def study(twin, seen, length_error_mm):
         actuators = twin.mechanism.require_reachable(command)
         fitted, legs = (variant.residuals(robot, command, actuators, places) for robot in (twin.mechanism, twin.truth))
         result, covariance = variant.fit(fitted)
-        # a longer arm changes the model, which the fit sees as measured less model with the other sign
+        # an arm's length changes the model; the residual, measured minus model, has the opposite sign
         lengths = taken_for_errors(fitted, -legs.jacobian(twin.truth.parameters.nominal)[..., 3:])
         points.append(_points(twin, variant.name, result.deviations))
         row = _calibration(variant, twin, result, len(command), length_error_mm * lengths)
@@ -59,7 +59,7 @@ def _calibration(variant, twin, result, poses, lengths_rad):
 
 
 def _scale(variant, fitted):
-    """Zero errors (3,) by which a fit answers to a target that is too large by `_SCALE_ERROR`; NaN without a target."""
+    """Bias (3,) of the zero errors from a target that is too large by `_SCALE_ERROR`; NaN without a target."""
     if variant.source == "tracker":
         return np.full(3, np.nan)
     larger = variant.residuals(fitted.mechanism, None, fitted.actuators, fitted.measured_mm * (1.0 + _SCALE_ERROR))
@@ -68,7 +68,7 @@ def _scale(variant, fitted):
 
 
 def _directions(variant, seen, covariance, lengths, scale):
-    """Rows of `delta_observability`: combinations of the zero errors, best seen first, and what is mistaken for them.
+    """Rows of `delta_observability`: combinations of the zero errors, best observable first, and their bias.
 
     seen: the Identifiability; covariance (3, 3) in rad^2; lengths (3, q), scale (3,): zero errors from lengths and
     from the target's scale.
@@ -89,7 +89,7 @@ def _directions(variant, seen, covariance, lengths, scale):
 
 
 def _points(twin, variant, zero_rad):
-    """Rows of `delta_points` when zero errors (3,) are fed back."""
+    """Rows of `delta_points` after correction of zero errors (3,)."""
     error, base = twin.plane_errors(zero_rad, twin.generator("plane", variant))
     return pd.DataFrame(
         {"variant": variant, "point": np.arange(1, len(error) + 1)}

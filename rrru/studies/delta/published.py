@@ -1,4 +1,4 @@
-"""Paper C's numbers beside this study's, from the configuration and the tables of the Delta."""
+"""Paper C's numbers compared with this study's, from the configuration and the tables of the Delta."""
 
 import numpy as np
 
@@ -29,7 +29,7 @@ def published_rows(section, points, camera, draws):
 
 
 def _design(section, camera):
-    """What is configured of the robot, the target and the poses, and the focal length that the calibration found."""
+    """Configured numbers of robot, target and poses, and the calibrated focal length."""
     azimuth = Delta().azimuth_rad
     focal_px = camera.set_index("parameter").loc["focal_x_px", "found"]
     return {

@@ -1,10 +1,10 @@
 """Search for the Delta's twin: zero and length errors under which errors before and after come near paper C's.
 
-What counts is the median over draws of the chain from the plate to the tracker, so that no draw is special, the
-configured one included; the shorter the length errors, the better. The optical centres' errors are those that the
-configured robot's camera has: they come from the target's dots and the lens, and a robot that stands a little off sees
-the same dots. What is found far from the configured robot becomes the configuration's, and is searched again in a
-narrow range about it. Lengths in mm, angles in rad.
+The objective is the median over draws of everything from the plate to the tracker, so that no single draw matters, with
+a penalty on the length errors. The errors of the optical centres are those of the configured robot's camera: they come
+from the target's dots and the lens, and a robot with slightly different errors sees the same dots. A result far from
+the configured robot replaces the configuration, and the search is repeated in a narrow range about it. Lengths in mm,
+angles in rad.
 """
 
 from dataclasses import dataclass, replace
@@ -22,13 +22,13 @@ _NAMES = ("before_mean", "before_max", "after_mean", "after_max")
 _PUBLISHED_MM = np.array([number.value for name in _NAMES for number in RESULTS if number.item == name])
 # ASSUME bounds of the zero errors and of every length's error
 _ZERO_RAD, _LENGTH_MM = 0.02, 0.3
-# ASSUME misfit that length errors of the bound's size are worth; the fourth power counts the longest most
-_PRICE = 0.05
+# ASSUME penalty, in units of the misfit, of length errors at their bound; the fourth power weights the longest most
+_PENALTY = 0.05
 
 
 @dataclass(frozen=True)
 class Search:
-    """Draws that are averaged, generations, and the share of the bounds that is searched about the configured twin."""
+    """Number of draws, generations, and the searched fraction of the bounds about the configured twin."""
 
     draws: int
     generations: int
@@ -36,7 +36,7 @@ class Search:
 
 
 def numbers(twin, command_mm, centre_errors_mm):
-    """The published four (4,) of a twin: mean and largest error before and after the paper's calibration, tracked.
+    """The four published values (4,) of a twin: mean and largest error before and after the paper's calibration.
 
     command_mm (n, 3): commands of the photographed poses; centre_errors_mm: errors (n, 3) of their optical centres in
     each draw. Medians over the draws.
@@ -44,10 +44,10 @@ def numbers(twin, command_mm, centre_errors_mm):
     actuators, places = twin.mechanism.inverse(command_mm), twin.drive(command_mm)
     draws = []
     for number, errors in enumerate(centre_errors_mm, 1):
-        own = replace(twin, labels=("search", number))
+        drawn = replace(twin, labels=("search", number))
         zero_rad = one_step(Distances(twin.mechanism, actuators, places + errors, alike=True))
         before, after = (
-            np.linalg.norm(own.plane_errors(fed_back, own.generator("plane", variant))[0], axis=1)
+            np.linalg.norm(drawn.plane_errors(fed_back, drawn.generator("plane", variant))[0], axis=1)
             for variant, fed_back in (("none", None), ("paper", zero_rad))
         )
         draws.append([before.mean(), before.max(), after.mean(), after.max()])
@@ -55,7 +55,7 @@ def numbers(twin, command_mm, centre_errors_mm):
 
 
 def misfit(reached_mm):
-    """RMS of the four numbers' relative deviations from the published ones."""
+    """RMS of the relative deviations of the four values from the published ones."""
     return float(np.sqrt(((reached_mm / _PUBLISHED_MM - 1.0) ** 2).mean()))
 
 
@@ -71,12 +71,12 @@ def search(twin, truth, centre_errors, settings):
     def misfit_of(deviations):
         return misfit(numbers(replace(twin, deviations=deviations), command, seen))
 
-    def price(deviations):
-        return misfit_of(deviations) + _PRICE * ((deviations[~angle] / _LENGTH_MM) ** 4).mean() ** 0.25
+    def penalised(deviations):
+        return misfit_of(deviations) + _PENALTY * ((deviations[~angle] / _LENGTH_MM) ** 4).mean() ** 0.25
 
     limit = np.where(angle, _ZERO_RAD, _LENGTH_MM)
     low, high = (np.clip(twin.deviations + side * settings.share * limit, -limit, limit) for side in (-1.0, 1.0))
     options = {"maxiter": settings.generations, "popsize": 5, "tol": 0.0, "polish": False}
     bounds = list(zip(low, high, strict=True))
-    result = differential_evolution(price, bounds, rng=twin.generator("search"), **options)
+    result = differential_evolution(penalised, bounds, rng=twin.generator("search"), **options)
     return result.x, misfit_of(result.x)

@@ -12,14 +12,14 @@ found                  float  as calibrated
 variant                str    how the zero errors were found; none: before
 
 ## delta_truth | delta/truth.parquet | pose
-What only the virtual robot knows: optical centres in the target's frame.
+True optical centres of the virtual robot in the target's frame.
 --
 pose plane command_{xyz}_mm
 true_{xyz}_mm          float  true optical centre, target frame
 
 ## delta_centres | tables/delta_centres.parquet | pose
-Optical centres as found in the images; dots are numbered from one of the first image, so that the origin is any dot
-of the target.
+Optical centres as found in the images; dots are numbered from one of the first image, so that the origin is an
+arbitrary dot of the target.
 --
 pose plane command_{xyz}_mm
 centre_{xyz}_mm        float  optical centre -R_j' T_j, target frame
@@ -50,26 +50,26 @@ parameter              str    entry of the camera matrix (px), distortion, or RM
 found
 
 ## delta_camera | tables/delta_camera.parquet | parameter
-The camera as calibrated from tilted views, beside the true one.
+The camera as calibrated from tilted views, compared with the true one.
 --
 parameter              str    as in delta_lens
 found
 true                   float? of the virtual camera; null where there is none
 
 ## delta_poses | tables/delta_poses.parquet | pose
-Optical centres found in the images against the true ones; a shift common to all poses is left out, since the origin
-is any dot.
+Optical centres found in the images against the true ones; without the common shift of all poses, since the origin is an
+arbitrary dot.
 --
 pose plane command_{xyz}_mm
-error_{xyz}_mm         float  found less true centre, less the mean over the poses
+error_{xyz}_mm         float  found minus true centre, minus the mean over the poses
 one_rotation_error_{xyz}_mm float  the same with one rotation for all images
 dots
 reprojection_rms_px    float  as in delta_centres
 
 ## delta_calibrations | tables/delta_calibrations.parquet | variant
-Every way to find the zero errors, and the errors on the plane when they are fed back and the robot is driven again.
-The variant paper is the paper's single linear step with all distances alike; the others have converged and know that
-every distance carries the first pose's noise.
+Every variant to estimate the zero errors, and the errors on the plane with the robot driven again after correction.
+The variant paper is the paper's single linear step with equal weights of the distances. The others have converged and
+account for the first pose's noise in every distance.
 --
 variant
 source                 str    images: R_j and T_j of every image; one_rotation: the same images, one rotation for all;
@@ -78,12 +78,12 @@ measure                str    distances from the first pose (paper C); shape: al
     free; heights or positions in the base frame {none, distances, shape, heights, positions}
 planes                 str    one: z = 100; two: half of it and a second height {none, one, two}
 poses                  int    poses used
-equations              float? numbers that are fitted
-rank                   float? combinations of the three zero errors that they see
+equations              float? number of residuals
+rank                   float? number of identifiable combinations of the three zero errors
 condition              float? largest over smallest singular value of the Jacobian by the zero errors, rows brought to
     independent noise of one axis each (for the paper's step too, which itself counts all distances alike)
-residual_rms_mm        float? RMS of what the fit leaves
-noise_mm               float? noise of one axis estimated from it, taken as alike along all axes (optical centres' is
+residual_rms_mm        float? RMS residual of the fit
+noise_mm               float? noise of one axis estimated from it, assumed equal along all axes (optical centres' is
     larger along the target than across); length errors count as noise here
 dtheta1_true_rad       float? true zero error of drive 1
 dtheta2_true_rad       float? true zero error of drive 2
@@ -91,37 +91,37 @@ dtheta3_true_rad       float? true zero error of drive 3
 dtheta1_found_rad      float? zero error found of drive 1
 dtheta2_found_rad      float? zero error found of drive 2
 dtheta3_found_rad      float? zero error found of drive 3
-dtheta1_error_rad      float? found less true zero error of drive 1
-dtheta2_error_rad      float? found less true zero error of drive 2
-dtheta3_error_rad      float? found less true zero error of drive 3
+dtheta1_error_rad      float? found minus true zero error of drive 1
+dtheta2_error_rad      float? found minus true zero error of drive 2
+dtheta3_error_rad      float? found minus true zero error of drive 3
 dtheta1_standard_error_rad float? standard error from noise_mm as if the lengths were exact, the first pose's noise in
     all distances counted: zero error of drive 1
 dtheta2_standard_error_rad float? standard error from noise_mm as if the lengths were exact, the first pose's noise in
     all distances counted: zero error of drive 2
 dtheta3_standard_error_rad float? standard error from noise_mm as if the lengths were exact, the first pose's noise in
     all distances counted: zero error of drive 3
-dtheta1_length_error_rad float? 1 sigma by which unknown length errors of all legs (`delta.length_error_mm`) move what
-    is found, beside the standard error: zero error of drive 1
-dtheta2_length_error_rad float? 1 sigma by which unknown length errors of all legs (`delta.length_error_mm`) move what
-    is found, beside the standard error: zero error of drive 2
-dtheta3_length_error_rad float? 1 sigma by which unknown length errors of all legs (`delta.length_error_mm`) move what
-    is found, beside the standard error: zero error of drive 3
+dtheta1_length_error_rad float? 1 sigma of the bias from unknown length errors of all legs (`delta.length_error_mm`),
+    in addition to the standard error: zero error of drive 1
+dtheta2_length_error_rad float? 1 sigma of the bias from unknown length errors of all legs (`delta.length_error_mm`),
+    in addition to the standard error: zero error of drive 2
+dtheta3_length_error_rad float? 1 sigma of the bias from unknown length errors of all legs (`delta.length_error_mm`),
+    in addition to the standard error: zero error of drive 3
 plane_mean_mm          float  mean error on the plane, in the calibration frame, as published
 plane_max_mm           float  largest error on the plane, in the calibration frame, as published
 base_mean_mm           float  mean error on the plane, in the frame of the robot's base
 base_max_mm            float  largest error on the plane, in the frame of the robot's base
 
 ## delta_observability | tables/delta_observability.parquet | variant direction
-Which combinations of the three zero errors a variant sees, best first, and what it mistakes for them.
+Observable combinations of the three zero errors by variant, best first, and their bias from other errors.
 --
 variant
-direction              int    1: best seen
+direction              int    1: best observable
 weight_dtheta1         float  share of dtheta1 in the unit direction
 weight_dtheta2         float  share of dtheta2 in the unit direction
 weight_dtheta3         float  share of dtheta3 in the unit direction
-common_share           float  squared part of the direction in which all drives move alike
+common_share           float  squared component of the direction with equal errors of all drives
 kind                   str    common: that part is more than half {common, differential}
-singular_value         float  mm of one axis's noise that the data change by per mm of arc at the end of the drive
+singular_value         float  change of the data, in mm of one axis's noise, per mm of arc at the end of the drive
     arm, see condition
 standard_error_rad     float  of the combination, as in delta_calibrations
 per_length_rad_mm      float  RMS error of the combination per mm (1 sigma) of unknown, independent length errors of
@@ -142,7 +142,7 @@ base_median_mm         float  median over the robots, in the frame of the robot'
 base_high_mm           float  90th percentile over the robots, in the frame of the robot's base
 
 ## delta_draws | tables/delta_draws.parquet | variant
-The same calibrations of the same robot with everything random drawn anew: dots of the plate, tilted views, noise of
+The same calibrations of the same robot with new random draws: dots of the plate, tilted views, noise of
 the dots' centres and of the tracker; dots are projected, not rendered. Percentiles over the draws.
 --
 variant
@@ -161,12 +161,12 @@ base_max_median_mm     float  median of the largest error on the plane, in the f
 base_max_high_mm       float  95 % of the largest error on the plane, in the frame of the robot's base
 
 ## delta_points | tables/delta_points.parquet | variant point
-Errors on the plane z = 0 as the tracker measures them, before (none) and after every variant is fed back.
+Errors on the plane z = 0 as the tracker measures them, before (none) and after correction by every variant.
 --
 variant
 point                  int    number of the point
 command_{xyz}_mm
-error_{xyz}_mm         float  error in the calibration frame, laid out by driving the robot along x and y
+error_{xyz}_mm         float  error in the calibration frame, defined by driving the robot along x and y
 base_error_{xyz}_mm    float  error in the frame of the robot's base
 error_mm               float  size in the calibration frame
 base_error_mm          float  size in the base frame

@@ -1,4 +1,4 @@
-"""Every way to find the Delta's zero errors: what it is given and what it fits. Lengths in mm, angles in rad."""
+"""Every variant to estimate the Delta's zero errors: its input and its residuals. Lengths in mm, angles in rad."""
 
 from dataclasses import dataclass
 
@@ -32,9 +32,9 @@ class Seen:
 
 @dataclass(frozen=True)
 class Variant:
-    """One way to find the zero errors.
+    """One variant to estimate the zero errors.
 
-    source: images, one_rotation (images of a camera that is known not to turn), true_centres (for comparison only) or
+    source: images, one_rotation (images of a camera with a common rotation), true_centres (for comparison only) or
     tracker; measure: distances, shape, positions or heights; planes: one or two; step: the paper's single linear step
     instead of a fit that has converged.
     """
@@ -46,12 +46,12 @@ class Variant:
     step: bool = False
 
     def used(self, planes):
-        """Which poses (n,) it uses: the whole first plane, or every other pose of it and the second plane."""
+        """Flags (n,) of its poses: the whole first plane, or every second pose of it and the second plane."""
         first = planes == "first"
         return first if self.planes == "one" else ~first | (np.cumsum(first) % 2 == 1)
 
     def places(self, twin, seen):
-        """Commands (n, 3) and places (n, 3) that it is given of what was `Seen`, in its source's frame."""
+        """Commands (n, 3) and places (n, 3) of its input from `Seen`, in its source's frame."""
         used = self.used(seen.planes)
         command = seen.command_mm[used]
         if self.source == "tracker":
@@ -59,7 +59,7 @@ class Variant:
         return command, getattr(seen, f"{self.source}_mm")[used]
 
     def residuals(self, mechanism, command_mm, actuators, places_mm):
-        """What it fits: residuals of the mechanism at actuators (n, 3) for places (n, 3)."""
+        """Residuals that it fits, of the mechanism at actuators (n, 3) for places (n, 3)."""
         if self.measure == "distances":
             return Distances(mechanism, actuators, places_mm, alike=self.step)
         if self.measure == "shape":

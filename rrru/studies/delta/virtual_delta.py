@@ -1,9 +1,9 @@
-"""The Delta of the vision study: its twin, where it is sent, and the tracker's errors on the plane. mm and rad.
+"""The Delta of the vision study: its twin, its commands, and the errors on the plane by a tracker. mm and rad.
 
-Errors are counted in two frames. The paper's calibration frame o-xyz (1.1) is laid out by driving the robot: origin
-where it stands at the command (0, 0, 0), x axis towards where it goes for x, y in the plane of where it goes for y.
-ASSUME it is laid out anew before and after the calibration. The other is the frame of the robot's base, which a tracker
-knows from the drive axes.
+Errors are given in two frames. The paper's calibration frame o-xyz (1.1) is defined by driving the robot: origin at its
+position for the command (0, 0, 0), x axis towards its position for a command along x, and the position for a command
+along y in the xy plane. ASSUME it is defined again before and after the calibration. The other one is the frame of the
+robot's base, which a tracker measures from the drive axes.
 """
 
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ from rrru.simulation.tracker import measure
 
 @dataclass(frozen=True)
 class Poses:
-    """Where images are taken: counts and half_mm along x and y of a field at z_mm; half of it again at second_z_mm."""
+    """Poses of the images: counts and half_mm along x and y of a grid at z_mm; half of it again at second_z_mm."""
 
     counts: tuple[int, int]
     half_mm: tuple[float, float]
@@ -27,10 +27,10 @@ class Poses:
     second_z_mm: float
 
     def commands(self):
-        """Planes' names (n,) and commands (n, 3) of every pose that is photographed, in the order driven.
+        """Planes' names (n,) and commands (n, 3) of every pose with an image, in the order driven.
 
-        The paper's poses, spread evenly over its plane ("first"), row by row to and fro so that steps are short; then
-        every other of them on a second height ("second"), backwards, so that the step between the planes is short too.
+        The paper's poses, spread evenly over its plane ("first"), in rows of alternating direction for short steps;
+        then every second one at a second height ("second"), backwards, for a short step between the planes.
         """
         x, y = (np.linspace(-half, half, count) for half, count in zip(self.half_mm, self.counts, strict=True))
         rows = [np.column_stack([x[:: (-1) ** r], np.full(len(x), y[r])]) for r in range(len(y))]
@@ -46,10 +46,10 @@ class Poses:
 class DeltaTwin:
     """A virtual Delta and its tasks.
 
-    mechanism: what the controller believes, its parameters are the drives' zero errors; truth: the same robot with
-    every leg's lengths as parameters, deviations (12,) the true ones; plane_mm (n, 3): where errors are counted;
-    axes_mm (3, 3): commands that lay out the calibration frame; tracker_noise_mm: 1 sigma per axis; labels: which
-    repetition of the study this is, every one has its own noise.
+    mechanism: the controller's model, with the drives' zero errors as parameters; truth: the same robot with every
+    leg's lengths as parameters, and its true deviations (12,); plane_mm (n, 3): where errors are evaluated; axes_mm (3,
+    3): commands that define the calibration frame; tracker_noise_mm: 1 sigma per axis; labels: of the repetition of the
+    study, each with its own noise.
     """
 
     mechanism: Delta
@@ -71,23 +71,23 @@ class DeltaTwin:
         return stream(self.seed, "delta", *self.labels, *labels)
 
     def positions(self, actuators):
-        """Where the robot really stands (n, 3), base frame, at the drive angles (n, 3) that its controller commands."""
+        """True positions (n, 3), base frame, at the drive angles (n, 3) that its controller commands."""
         return self.truth.forward(actuators, self.deviations)
 
     def drive(self, command_mm, zero_rad=None):
-        """Where it really goes (n, 3), base frame, for commands (n, 3) when zero errors (3,) are fed back."""
+        """True positions (n, 3), base frame, for commands (n, 3) with corrected zero errors (3,)."""
         return self.positions(self.mechanism.require_reachable(command_mm, zero_rad))
 
     def plane_errors(self, zero_rad, generator):
         """Errors (n, 3) on the plane in the calibration frame and in the base's, as a tracker measures; see `drive`."""
         command = np.concatenate([self.axes_mm, self.plane_mm])
         measured = measure(self.drive(command, zero_rad), self.tracker_noise_mm, generator)
-        own = in_own_frame(measured[:3], measured[3:])
-        return own - self.plane_mm, measured[3:] - self.plane_mm
+        in_calibration_frame = in_own_frame(measured[:3], measured[3:])
+        return in_calibration_frame - self.plane_mm, measured[3:] - self.plane_mm
 
 
 def twin(config):
-    """The twin of the configuration's `delta` section; raises ConfigError where it cannot go where it is sent."""
+    """The twin of the configuration's `delta` section; raises ConfigError for a command out of reach."""
     section, sets = config["delta"], ("zero", "legs")
     mechanism, truth = (make_mechanism("delta", config["robots"]["delta"], parameter_set=name) for name in sets)
     result = DeltaTwin(
@@ -114,7 +114,7 @@ def disc(radius_mm, step_mm, z_mm):
 
 
 def in_own_frame(axes_mm, places_mm):
-    """Places (n, 3) in the frame of three (3, 3): its origin, one on the x axis, one in the xy plane where y > 0."""
+    """Places (n, 3) in the frame of axes_mm (3, 3): its origin, a point on x, and one in the xy plane with y > 0."""
     x = axes_mm[1] - axes_mm[0]
     z = np.cross(x, axes_mm[2] - axes_mm[0])
     frame = np.array([x, np.cross(z, x), z])

@@ -1,8 +1,8 @@
-"""From images of a dot target to the camera's places (paper C, 2): dots, their numbers, the camera, O_cj = -R_j^T T_j.
+"""From images of a dot target to camera poses (paper C, 2): dots, their numbers, the camera, O_cj = -R_j^T T_j.
 
 A target is a lattice of dots in the plane z = 0 of its frame. Dots are numbered within an image from one near its
-middle, x to the image's right and y upwards: an image alone does not say which dots of the plate it shows. Centres in
-pixels, the first pixel's is (0, 0); mm, rad.
+middle, x to the right and y upwards, because an image alone does not show which dots of the plate it has. Centres are
+in pixels, that of the first pixel is (0, 0); mm, rad.
 """
 
 from dataclasses import dataclass, replace
@@ -14,27 +14,27 @@ from scipy.spatial.transform import Rotation
 
 from rrru.errors import FitError
 
-# the camera's calibration adds up in an order that depends on OpenCV's threads: one gives the same bytes everywhere
+# the order of sums in the camera calibration depends on OpenCV's threads; one thread gives reproducible bytes
 cv2.setNumThreads(1)
 
 # pixels by which the window of a dot's centre exceeds the dot, so that it holds the blurred edge
 _EDGE_PX = 4
-# dots that are smaller or larger than the median one by more are none
+# areas of dots relative to the median one
 _AREA_SHARE = (0.6, 1.5)
-# a dot belongs to the lattice within this share of the pitch
+# largest distance of a dot from the lattice, over the pitch
 _LATTICE_SHARE = 0.15
-# neighbours along a row or column lie within this many times the nearest dot's distance, diagonal ones beyond
-_BESIDE = 1.3
+# largest distance of neighbours along a row or column over that of the nearest dot; diagonal ones are farther
+_MAX_NEIGHBOUR = 1.3
 _FEWEST_DOTS = 12
-# a commanded step tells the dots' numbers when it is off their lattice by less than this share of the pitch
-_SURE_SHARE = 0.4
-# corners of the polygon that stands for a dot's edge
+# largest difference of a commanded step from the lattice, over the pitch, for which the dots' numbers are unique
+_MAX_STEP_ERROR = 0.4
+# corners of the polygon that approximates a dot's edge
 _CORNERS = 36
 
 
 @dataclass(frozen=True)
 class Lattice:
-    """A target as its maker states it: pitch and diameter of its dots."""
+    """A target as stated by its maker: pitch and diameter of its dots."""
 
     pitch_mm: float
     diameter_mm: float
@@ -46,7 +46,7 @@ class Lattice:
 
 @dataclass(frozen=True)
 class Dots:
-    """What one image shows: centre_px (n, 2) and number (n, 2) of every dot; numbers count along the target's axes."""
+    """The dots of one image: centre_px (n, 2) and number (n, 2) of each; numbers count along the target's axes."""
 
     centre_px: np.ndarray
     number: np.ndarray
@@ -54,7 +54,7 @@ class Dots:
 
 @dataclass(frozen=True)
 class CameraModel:
-    """A calibrated camera: matrix (3, 3), distortion (k1, k2, p1, p2), rms in px that the calibration left."""
+    """A calibrated camera: matrix (3, 3), distortion (k1, k2, p1, p2), rms residual of the calibration in px."""
 
     matrix: np.ndarray
     distortion: np.ndarray
@@ -77,7 +77,7 @@ class CameraModel:
         return np.stack([moved_x * fx + cx, moved_y * fy + cy])
 
     def centre_bias(self, number, turn, shift_mm, lattice):
-        """Pixels (n, 2) from the image of each dot's centre to its image's centroid: a tilted circle's is off it.
+        """Pixels (n, 2) from the image of each dot's centre to its image's centroid, which differ for tilted circles.
 
         number (n, 2): of the dots; turn, shift_mm: as in `project`.
         """
@@ -108,18 +108,18 @@ class Pose:
 
 
 def read_dots(image, name):
-    """Dots of an image (height, width) of 8 bits; raises FitError with its name where too few make a lattice."""
+    """Dots of an image (height, width) of 8 bits; raises FitError with its name where too few are on a lattice."""
     centres = find_dots(image)
     numbers, known = centres, np.zeros(len(centres), dtype=bool)
     if len(centres) >= _FEWEST_DOTS:
         numbers, known = number_dots(centres)
     if known.sum() < _FEWEST_DOTS:
-        raise FitError(f"{name}: {known.sum()} dots make a lattice; allowed: at least {_FEWEST_DOTS}")
+        raise FitError(f"{name}: {known.sum()} dots are on a lattice; allowed: at least {_FEWEST_DOTS}")
     return Dots(centres[known], numbers[known])
 
 
 def find_dots(image):
-    """Centres (n, 2) of the dark dots that an image shows whole: mean of the pixels weighted by their darkness."""
+    """Centres (n, 2) of the dark dots that are completely in an image: mean of the pixels weighted by darkness."""
     _, dark = cv2.threshold(image, 0, 1, cv2.THRESH_BINARY_INV + cv2.THRESH_OTSU)
     _, labels, stats, _ = cv2.connectedComponentsWithStats(dark)
     left, top, width, height, area = stats.T
@@ -140,19 +140,19 @@ def find_dots(image):
 def number_dots(centre_px):
     """Numbers (n, 2) of dots at centres (n, 2) and which (n,) have one.
 
-    From the dot nearest to the middle that has its four neighbours the lattice grows outwards; what is numbered gives
-    the homography that numbers the next. The camera may be turned about its axis by less than 45 degrees and tilted by
+    The lattice grows outwards from the dot with four neighbours that is nearest to the middle. The numbered dots give
+    the homography for the next ones. The camera may be rotated about its axis by less than 45 degrees and tilted by
     less than 30.
     """
     steps = centre_px[None] - centre_px[:, None]
     distance = np.linalg.norm(steps, axis=-1)
     np.fill_diagonal(distance, np.inf)
-    beside = distance < _BESIDE * distance.min(axis=1, keepdims=True)
-    inner = beside.sum(axis=1) == 4
+    neighbours = distance < _MAX_NEIGHBOUR * distance.min(axis=1, keepdims=True)
+    inner = neighbours.sum(axis=1) == 4
     if not inner.any():
         return np.zeros(centre_px.shape, dtype=int), np.zeros(len(centre_px), dtype=bool)
     start = np.where(inner, np.linalg.norm(centre_px - centre_px.mean(axis=0), axis=1), np.inf).argmin()
-    near = steps[start][beside[start]]
+    near = steps[start][neighbours[start]]
     right = near[near[:, 0].argmax()]
     basis = np.column_stack([right, near[(right[0] * near[:, 1] - right[1] * near[:, 0]).argmin()]])
     place = np.linalg.solve(basis, steps[start].T).T
@@ -170,8 +170,8 @@ def number_dots(centre_px):
 def calibrate_camera(views, size_px, lattice):
     """CameraModel from Dots of several tilted views of one target; size_px: width and height.
 
-    Parallel views would not do: they see the focal length and the distance only together. A first calibration tells how
-    far every dot's image is off that of its centre, the second is free of that.
+    Focal length and distance are confounded in parallel views. A first calibration gives the bias of every dot's
+    centroid, the second one is corrected for it.
     """
     places = [lattice.places(view.number).astype(np.float32) for view in views]
 
@@ -187,7 +187,7 @@ def calibrate_camera(views, size_px, lattice):
 
 
 def camera_pose(model, dots, lattice):
-    """Pose of the calibrated camera against the target from the dots of one image."""
+    """Pose of the calibrated camera relative to the target from the dots of one image."""
     places, centres, lens = lattice.places(dots.number), dots.centre_px, (model.matrix, model.distortion)
     for _ in range(2):
         solved, turn, shift = cv2.solvePnP(places, centres, *lens)
@@ -200,7 +200,7 @@ def camera_pose(model, dots, lattice):
 
 
 def camera_poses(model, views, lattice):
-    """Poses for the Dots of every image: each by itself ("centre"), and of a camera that never turns ("one_rotation").
+    """Poses for the Dots of every image: each separately ("centre"), and with a common rotation ("one_rotation").
 
     For the latter all have the mean rotation, with which the translation t follows from linear equations,
     x (R X + t)_z = (R X + t)_x of every dot and the same for y.
@@ -219,19 +219,19 @@ def camera_poses(model, views, lattice):
 
 
 def join_places(centre_mm, command_mm, pitch_mm):
-    """Optical centres (n, 3) in one target frame, from those whose dots were numbered image by image.
+    """Optical centres (n, 3) in one target frame, from those with dots numbered image by image.
 
-    The first one's numbers hold. command_mm (n, 3): commanded positions. The step between two images is known to whole
-    pitches from the command, as long as the robot's error and the target's turn against the robot's axes make less than
-    half a pitch of it. Raises FitError where that is in doubt.
+    The numbers of the first image are used. command_mm (n, 3): commanded positions. The command gives the step between
+    two images in whole pitches if robot error and rotation of the target relative to the robot's axes contribute less
+    than half a pitch. Raises FitError where that is not certain.
     """
     missing = (np.diff(command_mm, axis=0) - np.diff(centre_mm, axis=0))[:, :2] / pitch_mm
     off = np.abs(missing - np.rint(missing)).max(axis=1)
-    doubtful = np.flatnonzero(off > _SURE_SHARE)
-    if doubtful.size:
+    ambiguous = np.flatnonzero(off > _MAX_STEP_ERROR)
+    if ambiguous.size:
         raise FitError(
-            f"pose {doubtful[0] + 2}: the step from the pose before is {off[doubtful[0]]:.2f} pitches off the dots' "
-            f"lattice; allowed: {_SURE_SHARE}, shorter steps or a target that is better aligned help"
+            f"pose {ambiguous[0] + 2}: the step from the pose before is {off[ambiguous[0]]:.2f} pitches off the dots' "
+            f"lattice; allowed: {_MAX_STEP_ERROR}; use shorter steps, or align the target with the robot's axes"
         )
     whole = pitch_mm * np.column_stack([np.rint(missing), np.zeros(len(missing))])
     return centre_mm + np.concatenate([np.zeros((1, 3)), np.cumsum(whole, axis=0)])

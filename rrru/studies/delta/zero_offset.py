@@ -1,4 +1,4 @@
-"""Zero errors of the drives from places that are known up to a rigid motion: the paper's step, and what it mistakes.
+"""Zero errors of the drives from places known up to a rigid motion: the paper's step, and its omitted-variable bias.
 
 Readings are `rrru.estimation.observations`: `Distances` (paper C, eqs. 8 to 15), `Shape`, `TargetHeights`. Lengths in
 mm, angles in rad.
@@ -13,17 +13,17 @@ from rrru.calibration.identifiability import analyse
 
 
 def one_step(residuals):
-    """Deviations (p,) by one step from the nominal robot: the paper's on `Distances` that count alike (eq. 15)."""
+    """Deviations (p,) by one step from the nominal robot: the paper's for `Distances` of equal weight (eq. 15)."""
     nominal = residuals.mechanism.parameters.nominal
     return nominal + taken_for_errors(residuals, residuals.residual(nominal)[..., None])[:, 0]
 
 
 def step_fit(distances):
-    """Calibration by the paper's step on `Distances` that count alike, and the covariance (p, p) of its deviations.
+    """Calibration by the paper's step on `Distances` of equal weight, and the covariance (p, p) of its deviations.
 
-    With J' J in place of the best weights the covariance is s^2 J^+ C J^+', C that of the distances, and s^2 the sum of
-    squared residuals over the trace of (I - J J^+) C. Singular values are those of the whitened distances, as in every
-    other fit.
+    With J' J instead of the optimal weights the covariance is s^2 J^+ C J^+', C that of the distances, and s^2 the sum
+    of squared residuals over the trace of (I - J J^+) C. Singular values are those of the whitened distances, as in
+    every other fit.
     """
     deviations = one_step(distances)
     plain = assess(estimate_deviations_at(distances, deviations, "one step", 1))
@@ -33,16 +33,16 @@ def step_fit(distances):
     left = distances.covariance - jacobian @ (inverse @ distances.covariance)
     noise = np.sqrt((plain.residual_mm**2).sum() / np.trace(left))
     covariance = noise**2 * inverse @ distances.covariance @ inverse.T
-    seen = analyse(distances.mechanism, replace(distances, alike=False).jacobian(deviations))
+    identifiability = analyse(distances.mechanism, replace(distances, alike=False).jacobian(deviations))
     errors = np.sqrt(np.diag(covariance))
-    return replace(plain, noise_mm=float(noise), standard_errors=errors, identifiability=seen), covariance
+    return replace(plain, noise_mm=float(noise), standard_errors=errors, identifiability=identifiability), covariance
 
 
 def taken_for_errors(residuals, changes):
-    """Deviations (p, q) by which a fit answers to changes of its residuals (m, k, q) that it does not know.
+    """Bias (p, q) of a fit from changes of its residuals (m, k, q) that are not in its model, to first order.
 
-    To first order. Changes are derivatives of measured less model values: of the model by other deviations, or of the
-    measurement by an instrument's.
+    Changes are derivatives of measured minus model values: of the model by other deviations, or of the measurement by
+    an instrument's errors.
     """
     jacobian = residuals.jacobian(residuals.mechanism.parameters.nominal)
     flat = jacobian.reshape(-1, jacobian.shape[-1])

@@ -1,4 +1,4 @@
-"""What a robot's file, its calibration and its corrected file leave of a campaign that none of them has seen."""
+"""Figure of the residuals of a robot's given, calibrated and corrected file on a held-out campaign."""
 
 from rrru.figures import style
 from rrru.figures.choose import where
@@ -13,17 +13,16 @@ _NOISE = {"color": style.GREY, "linestyle": (0, (4, 2)), "linewidth": 0.9}
 
 @style.printed
 def circle(tables, options):
-    """Measured less modelled position on a campaign that no model has seen: the robot's file as it came, its numbers
-    calibrated, and the file that the diagnosis gave back. (a) Point by point. (b) All points, beside the instrument's
-    noise.
+    """Measured minus modelled position on a held-out campaign: the robot's file as given, its parameters calibrated,
+    and the corrected file of the diagnosis. (a) Point by point. (b) All points, compared with the instrument's noise.
     """
     whole, points = tables["circle"], tables["circle_points"]
     figure = style.new(style.DOUBLE_MM, 68.0)
     along, sums = figure.subplots(1, 2, width_ratios=(2.0, 1.0))
     noise = whole["noise_rms_mm"].iloc[0]
     for place, (model, (label, look)) in enumerate(_MODELS.items()):
-        own, rms = where(points, model=model)["error_mm"], where(whole, model=model)["rms_mm"].iloc[0]
-        along.plot(range(1, len(own) + 1), own, linestyle="none", label=label, **look)
+        error, rms = where(points, model=model)["error_mm"], where(whole, model=model)["rms_mm"].iloc[0]
+        along.plot(range(1, len(error) + 1), error, linestyle="none", label=label, **look)
         sums.bar(place, rms, width=0.6, color=look["color"] if model != "given" else style.GREY)
         sums.annotate(style.number(rms), (place, rms), (0, 2), textcoords="offset points", ha="center", fontsize=7.0)
     for axes in (along, sums):

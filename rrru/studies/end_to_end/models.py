@@ -1,4 +1,4 @@
-"""A robot's file as it came, calibrated and corrected, on a campaign that none of them has seen. Lengths in mm."""
+"""A robot's file as given, calibrated and corrected, evaluated on a held-out campaign. Lengths in mm."""
 
 from pathlib import Path
 
@@ -15,7 +15,7 @@ from rrru.robots.catalogue import make_mechanism
 
 
 def check(config):
-    """Raise ConfigError where `circle` names no campaign, or not twice the same robot of an MJCF."""
+    """Raise ConfigError where `circle` names an unknown campaign, or not the same robot of an MJCF for both."""
     section = config.get("circle")
     if not section:
         return
@@ -32,27 +32,27 @@ def check(config):
 
 
 def errors(fresh, nominal, masses, calibrated, corrected):
-    """Frame `circle_points` of a measurement table: what each model leaves of every usable point.
+    """Frame `circle_points` of a measurement table: errors of each model at every usable point.
 
     nominal: the robot's part of the configuration, of an MJCF; calibrated: its Robot and deviations; corrected: path of
-    the corrected MJCF. Points of which a model says nothing are left out. Raises ConfigError where more than the tool's
-    position was read, SimulationError or UnreachableError where MuJoCo cannot drive a file.
+    the corrected MJCF. Points without a prediction by a model are left out. Raises ConfigError where more than the
+    tool's position was measured, SimulationError or UnreachableError where MuJoCo cannot drive a file.
     """
     if rows.readings(fresh) is not None:
         raise ConfigError(f"circle: {nominal['name']}'s fresh campaign has more than positions; allowed: of the tool")
     name, section, (robot, deviations) = nominal["name"], nominal["dimensions"], calibrated
-    own = section | {"mjcf": str(corrected)}
+    corrected_section = section | {"mjcf": str(corrected)}
     if (tool_mm := measured_tool_mm(corrected)) is not None:
-        own["tool_mm"] = tool_mm.tolist()
-    given, other = (make_mechanism(name, one, parameter_set="frame") for one in (section, own))
+        corrected_section["tool_mm"] = tool_mm.tolist()
+    given, other = (make_mechanism(name, part, parameter_set="frame") for part in (section, corrected_section))
     case = make_case(fresh, given, masses, 1.0, {})
     models = {
         "given": _driven(case.motion, given, section),
         "calibrated": robot.forward(rows.actuators(fresh, robot), deviations, rows.command(fresh)),
-        "corrected": _driven(case.motion, other, own),
+        "corrected": _driven(case.motion, other, corrected_section),
     }
     left = {model: rows.measured(fresh) - position for model, position in models.items()}
-    # the sense of arrival of a drive is unknown at a run's first point and next to a reversal
+    # the direction of approach of a drive is unknown at a run's first point and next to a reversal
     known = ~np.isfinite(case.motion.approach).any(axis=1)
     used = case.used & known & np.isfinite(list(left.values())).all(axis=(0, 2))
     named = fresh.loc[used, ["run", "trajectory", "point"]]
@@ -64,17 +64,17 @@ def errors(fresh, nominal, masses, calibrated, corrected):
 
 
 def sizes(points, effects, noise_mm):
-    """Frame `circle` without its campaigns from `circle_points`; effects: what the diagnosis found; noise per axis."""
+    """Frame `circle` without its campaigns from `circle_points`; effects: found by the diagnosis; noise per axis."""
     result, noise = [], float(np.sqrt(3.0) * noise_mm)
-    for model, own in points.groupby("model", sort=False):
-        squares = own["error_mm"] ** 2
-        told = {"model": model, "effects": effects if model == "corrected" else "none", "points": len(own)}
-        lengths = {"rms_mm": float(np.sqrt(squares.mean())), "max_mm": own["error_mm"].max()}
-        result.append(told | lengths | {"noise_rms_mm": noise, "gap_rms_mm": gap_rms(squares - noise**2)})
+    for model, rows_of_model in points.groupby("model", sort=False):
+        squares = rows_of_model["error_mm"] ** 2
+        labels = {"model": model, "effects": effects if model == "corrected" else "none", "points": len(squares)}
+        lengths = {"rms_mm": float(np.sqrt(squares.mean())), "max_mm": rows_of_model["error_mm"].max()}
+        result.append(labels | lengths | {"noise_rms_mm": noise, "gap_rms_mm": gap_rms(squares - noise**2)})
     return pd.DataFrame(result)
 
 
 def _driven(motion, robot, section):
-    """Positions (n, 3) of the tool where MuJoCo drives a robot's file along a Motion."""
+    """Positions (n, 3) of the tool of a robot's file that MuJoCo simulates along a Motion."""
     poses, twists = simulated(motion, robot, Path(section["mjcf"]), section["platform"])
     return robot.measured(poses, twists)

@@ -1,4 +1,4 @@
-"""Every method on one robot: true errors of the driven robot before and after, points and times it takes. mm, s."""
+"""Every method on one robot: true errors of the driven robot before and after, points and times. mm, s."""
 
 from dataclasses import replace
 from time import perf_counter
@@ -11,12 +11,12 @@ from rrru.seeds import run_seed
 from rrru.studies.methods import learners
 from rrru.studies.methods.regions import TESTS
 
-# a method has enough points where all that more of them bring is this share of its mean error, or the tracker's noise
-_ENOUGH = 0.1
+# a method has enough points where more of them improve its mean error by less than this share, or than the noise
+_MIN_IMPROVEMENT = 0.1
 
 
 class Judge:
-    """Drives a trial's targets with what methods learned and keeps the rows of `method_points` and `method_timings`."""
+    """Drives a trial's targets with learned controllers and collects rows of `method_points` and `method_timings`."""
 
     def __init__(self, trial):
         self.trial = trial
@@ -25,19 +25,19 @@ class Judge:
         self.rows, self.timings = [], []
 
     def errors(self, test, controller=None):
-        """Distances (m,) between the targets of a test and where the robot truly goes; NaN where it cannot."""
+        """Distances (m,) between the targets of a test and the true positions; NaN where the robot has none."""
         _, truth = self.trial.run(self.plans[test], test, controller)
         return np.linalg.norm(rows.vectors(truth, "true") - self.plans[test].targets(), axis=1)
 
     def learn(self, method, count, learn):
-        """What a method learns from a number of points, its time kept."""
+        """The learned model of a method from a number of points; its time is recorded."""
         start = perf_counter()
         learned = learn()
         self.timings.append({"method": method, "points": count, "seconds": perf_counter() - start})
         return learned
 
     def judge(self, method, count, time_s, learned, tests=TESTS):
-        """Add the rows of what a method learned from a number of points that took so long to measure."""
+        """Add the rows of a learned model; count, time_s: of its training points."""
         for test in tests:
             before, after = self.before[test], self.errors(test, learned.controller)
             self.rows.append(
@@ -86,7 +86,7 @@ def measuring_time_s(trial, points_mm):
 
 
 def _duration_s(plan):
-    """When the last point of a plan is measured."""
+    """Time of the last measurement of a plan."""
     return float(plan.time_s()[-1])
 
 
@@ -96,7 +96,7 @@ def _step(judge, test):
     measurements, _ = judge.trial.run(plan, f"{test} first")
     points = learners.measured_points(judge.trial.robot.mechanism, measurements)
     path, index = plan.path()
-    # where a target was not measured nothing is known of its error
+    # targets without a measurement have no known error
     index = index[rows.usable(measurements)]
 
     def learn():
@@ -108,12 +108,12 @@ def _step(judge, test):
 
 
 def summary(curve, noise_mm):
-    """Rows of `methods`: each method with all its points, and the fewest after which more bring next to nothing."""
+    """Rows of `methods`: each method with all its points, and the fewest points that are enough."""
     result = []
     for method, part in curve.groupby("method", sort=False):
         inside = part[part["test"] == "inside"].sort_values("points")
         last = inside["after_mean_mm"].iloc[-1]
-        short = np.flatnonzero(inside["after_mean_mm"] > max((1.0 + _ENOUGH) * last, last + noise_mm))
+        short = np.flatnonzero(inside["after_mean_mm"] > max((1.0 + _MIN_IMPROVEMENT) * last, last + noise_mm))
         enough = inside.iloc[short[-1] + 1 if short.size else 0]
         most = part.sort_values("points", kind="stable").drop_duplicates("test", keep="last").set_index("test")
         result.append(

@@ -1,4 +1,4 @@
-"""All methods on all robots: what each leaves of the error inside and outside its region, and with fewer points."""
+"""Figure of all methods on all robots: residual errors inside and outside their region, and with fewer points."""
 
 from matplotlib.ticker import LogLocator
 
@@ -8,7 +8,7 @@ from rrru.figures.choose import where
 
 
 def _look(colour, marker, filled=True, dashes="-"):
-    """How a line is drawn."""
+    """Style of a line."""
     return {"color": colour, "marker": marker, "linestyle": dashes, "markerfacecolor": colour if filled else "white"}
 
 
@@ -31,9 +31,9 @@ _OUTSIDE = {"color": style.ORANGE, "marker": "^", "markerfacecolor": "white"}
 
 @style.printed
 def methods(tables, options):
-    """Every method on every robot where it makes sense, judged on true errors of the driven robot. (a) to (c) Mean
-    error after it, with a bar to the largest, at targets inside the region that it learned on and around it. (d) to
-    (f) What fewer points cost.
+    """Every applicable method on every robot, with true errors of the driven robot. (a) to (c) Mean error after
+    correction, with a bar to the largest, at targets inside the region of the training points and around it. (d) to
+    (f) Mean error with fewer training points.
     """
     frame, curves = tables["methods"], tables["method_points"]
     robots = [name for name in _ROBOTS if (frame["robot"] == name).any()]
@@ -43,9 +43,9 @@ def methods(tables, options):
     figure = style.new(style.DOUBLE_MM, 150.0)
     panels = figure.subplots(2, len(robots), squeeze=False, height_ratios=(1.15, 1.0))
     for column, (robot, marks) in enumerate(zip(robots, ("ad", "be", "cf"), strict=False)):
-        own, before = where(frame, robot=robot), where(frame, robot=robot, test="inside")["before_mean_mm"].iloc[0]
-        _left(panels[0, column], own, shown, before)
-        panels[0, column].set_title(f"({marks[0]}) {_ROBOTS[robot]}: what is left")
+        results, before = where(frame, robot=robot), where(frame, robot=robot, test="inside")["before_mean_mm"].iloc[0]
+        _residual_errors(panels[0, column], results, shown, before)
+        panels[0, column].set_title(f"({marks[0]}) {_ROBOTS[robot]}: residual error")
         panels[0, column].tick_params(labelleft=column == 0)
         _learning(panels[1, column], where(curves, robot=robot, test="inside"), before)
         panels[1, column].set_title(f"({marks[1]}) {_ROBOTS[robot]}: fewer points")
@@ -56,11 +56,11 @@ def methods(tables, options):
     return figure
 
 
-def _left(axes, own, shown, before):
+def _residual_errors(axes, results, shown, before):
     """Mean errors on both tests with bars to the largest ones, and the mean before."""
     rows = {name: place for place, name in enumerate(shown)}
     for test, look, shift in (("inside", _INSIDE, -0.14), ("outside", _OUTSIDE, 0.14)):
-        part = where(own, test=test)
+        part = where(results, test=test)
         place = part["method"].map(rows) + shift
         axes.hlines(place, part["after_mean_mm"], part["after_max_mm"], color=look["color"], linewidth=0.8)
         label = f"{test} the region, bar to the largest"
@@ -73,7 +73,7 @@ def _left(axes, own, shown, before):
 
 
 def _learning(axes, curves, before):
-    """Mean error inside against the number of points learned from."""
+    """Mean error inside against the number of training points."""
     for name, (label, look) in _METHODS.items():
         part = where(curves, method=name).sort_values("points")
         if look and len(part):

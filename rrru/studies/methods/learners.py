@@ -1,4 +1,4 @@
-"""The methods: each learns from measured points and becomes a controller, positions in the order driven to actuators.
+"""The methods: each gives a controller from measured points, from positions in the order driven to actuators.
 
 Lengths in mm.
 """
@@ -29,7 +29,7 @@ NEEDS = {
 
 @dataclass(frozen=True)
 class Learned:
-    """A controller, how many numbers it learned and how often the model was evaluated, in points solved."""
+    """A controller, the number of its learned parameters, and of its model evaluations (points solved)."""
 
     controller: object
     numbers: int
@@ -38,7 +38,7 @@ class Learned:
 
 @dataclass(frozen=True)
 class Candidates:
-    """How networks are chosen: folds of the cross-validation, most neurons, spreads in units of the points' spacing."""
+    """Choices for networks: folds of the cross-validation, most neurons, spreads in units of the points' spacing."""
 
     folds: int
     neurons: int
@@ -57,7 +57,7 @@ def _with(points, parameter_set):
 
 
 def _calibrated(points, result):
-    """What a search for the deviations of the points' mechanism has learned."""
+    """The Learned controller of a search for the deviations of the points' mechanism."""
     controller = partial(points.mechanism.inverse, deviations=result.deviations)
     return Learned(controller, len(result.deviations), result.evaluations * len(points))
 
@@ -84,7 +84,7 @@ def rbf_map(points, candidates, generator):
 
 
 def rbf_after_parameters(points, candidates, generator):
-    """Least squares first, then a network for what it leaves."""
+    """Least squares, then a network for its residuals."""
     points = _with(points, points.mechanism.TRACKED)
     found = calibrate(points)
     answers, numbers = _trained(points.start_mm, points.residual(found.deviations), candidates, generator)
@@ -111,7 +111,7 @@ def jacobian_step(points, path_index):
 
 
 def offsets(mechanism, values):
-    """Drive offsets (3,) that another measurement has found."""
+    """The controller with drive offsets (3,) from another measurement."""
     zero = replace(mechanism, parameter_set="zero")
     return Learned(partial(zero.inverse, deviations=np.asarray(values, dtype=float)), 3, 0)
 
@@ -133,7 +133,7 @@ def position_methods(points, candidates, genetic_settings, generator, seed):
 def _trained(command_mm, targets, candidates, generator):
     """Network of the least cross-validated error, and the count of its weights and thresholds."""
     folds = make_folds(len(command_mm), candidates.folds, generator)
-    # candidates in units of the distance that evenly spread points have
+    # candidates in units of the distance of evenly spread points
     spacing = (np.prod(np.ptp(command_mm, axis=0)) / len(command_mm)) ** (1.0 / 3.0)
     most = min(candidates.neurons, len(command_mm) - len(command_mm) // candidates.folds - 1)
     choice = choose(command_mm, targets, [share * spacing for share in candidates.spreads], most, folds)

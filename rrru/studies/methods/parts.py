@@ -1,10 +1,10 @@
-"""What the comparison of methods reads of the configuration. Light to import: the workflow asks for it."""
+"""The part of the configuration for the comparison of methods. Light to import, since the workflow imports it."""
 
 _SHARED = ("points", "test_points", "outside_factor", "motion", "network")
 
 
 def settings(config, name):
-    """All that the comparison on one robot reads of the configuration, as plain mappings.
+    """The complete settings of the comparison on one robot, as plain mappings.
 
     The robot is the one of the robot's own study: of the reproduced campaign, of paper B, of the vision study.
     """

@@ -1,4 +1,4 @@
-"""Where methods are compared: a virtual robot, points to learn from, targets inside and outside their region. mm."""
+"""Setup of the comparison of methods: virtual robot, training points, targets inside and outside their region. mm."""
 
 from dataclasses import dataclass
 
@@ -15,7 +15,7 @@ TESTS = ("inside", "outside")
 
 @dataclass(frozen=True)
 class Region:
-    """Upright cylinder that is learned on, about (x, y) between two heights, and the tracker's noise there."""
+    """Vertical cylinder of the training points, about (x, y) between two heights, and the tracker's noise there."""
 
     centre_mm: tuple[float, float]
     radius_mm: float
@@ -23,13 +23,13 @@ class Region:
     noise_mm: float
 
     def points(self, count, generator, factor=1.0):
-        """Points (count, 3) spread evenly over the cylinder, widened about its middle by a factor."""
+        """Points (count, 3) spread evenly over the cylinder, scaled about its middle by a factor."""
         middle, half = np.mean(self.z_mm), 0.5 * np.ptp(self.z_mm)
         heights = (middle - factor * half, middle + factor * half)
         return cylinder_points(self.centre_mm, factor * self.radius_mm, heights, count, generator)
 
     def holds(self, points_mm):
-        """Which points (n,) lie within."""
+        """Flags (n,) of the points inside."""
         near = np.hypot(*(points_mm[:, :2] - self.centre_mm).T) <= self.radius_mm
         return near & (np.abs(points_mm[:, 2] - np.mean(self.z_mm)) <= 0.5 * np.ptp(self.z_mm))
 
@@ -55,7 +55,7 @@ class Trial:
         return stream(self.seed, "methods", self.name, *labels)
 
     def plan(self, points_mm):
-        """Plan that stops at points (n, 3), in an order of short ways."""
+        """Plan that stops at points (n, 3), in an order of short moves."""
         return stops("stops", nearest_first(points_mm), **self.motion)
 
     def run(self, plan, label, controller=None):
@@ -64,7 +64,7 @@ class Trial:
 
 
 def trial(settings):
-    """The comparison of `parts.settings`; raises ConfigError where a point of it is out of reach."""
+    """The comparison of `parts.settings`; raises ConfigError where one of its points is out of reach."""
     name, count, wider = settings["robot"], settings["test_points"], settings["outside_factor"]
     region, generator = Region(**settings["region"]), stream(settings["seed"], "methods", name, "points")
     robot = setup.real_robot(settings["nominal"], settings["real"])

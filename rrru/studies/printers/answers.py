@@ -9,13 +9,13 @@ from rrru.studies.printers.judge import FOREIGN, REPRODUCED, UNTRIED
 _BELONGS = {
     REPRODUCED: "belongs to the readings",
     FOREIGN: "does not belong to the readings",
-    UNTRIED: "is not said to come from the readings",
+    UNTRIED: "is not stated to come from the readings",
 }
 
 
 @dataclass(frozen=True)
 class Answer:
-    """What is said of a printer: sentences by topic, and blocks of settings by what they are."""
+    """The answer on a printer: sentences by topic, and blocks of settings by title."""
 
     name: str
     sentences: dict
@@ -34,8 +34,8 @@ def answer(judged):
         "saved answer": ": ".join(filter(None, [_BELONGS[judged.verdict], judged.reason])),
         "readings": _readings(result),
         "suspicious reading": _suspect(judged),
-        "cause of what is left": judged.cause,
-        "effector": "nothing to tell: no probe beside the nozzle is stated" if tilt is None else tilt.text,
+        "cause of the residuals": judged.cause,
+        "effector": "not tested: no probe offset from the nozzle is stated" if tilt is None else tilt.text,
     }
     settings = {"calibration from all readings": _settings(result)}
     if judged.suspect is not None:
@@ -45,27 +45,27 @@ def answer(judged):
 
 
 def _readings(result):
-    """How many there are, and what the calibration leaves of them."""
+    """Numbers of readings and their residuals after calibration."""
     residuals = result.residuals
     parts = zip(("heights", "distances"), np.split(result.in_mm.residual, [len(residuals.height_mm)]), strict=True)
-    told = [f"{len(part)} {kind} (rms {np.sqrt((part**2).mean()):.3f} mm)" for kind, part in parts if len(part)]
-    return f"the calibration leaves of {' and '.join(told)}"
+    residual = [f"{len(part)} {kind} (rms {np.sqrt((part**2).mean()):.3f} mm)" for kind, part in parts if len(part)]
+    return f"residuals after calibration of {' and '.join(residual)}"
 
 
 def _suspect(judged):
-    """Which reading to take again."""
+    """The reading to repeat."""
     if judged.left.suspect is None:
-        return "too few readings to tell"
+        return "too few readings for a test"
     if judged.suspect is None:
         return "none"
     number, result = judged.suspect, judged.result
     read, off = result.residuals.measured_mm[number], judged.left.difference_mm[number]
-    told = f"{result.reading_name(number)}: {read:g} mm, where the others foretell {read - off:.2f} mm"
-    return f"{told} (by chance once in {1.0 / judged.left.p[number]:.0f} printers); take it again"
+    difference = f"{result.reading_name(number)}: {read:g} mm, predicted from the others {read - off:.2f} mm"
+    return f"{difference} (by chance in one of {1.0 / judged.left.p[number]:.0f} printers); repeat this reading"
 
 
 def _settings(result):
-    """Fitted numbers as Klipper's settings; arms that heights do not calibrate are the saved ones."""
+    """Fitted numbers as Klipper's settings; arms are the saved ones where only heights were measured."""
     numbers = np.concatenate([result.fitted, result.printer.arm_mm])[:9]
     radius, angles, endstops, arms = numbers[0], [*numbers[1:3], result.printer.angle_deg[2]], numbers[3:6], numbers[6:]
     lines = ["[printer]", f"delta_radius: {radius:.6f}"]

@@ -1,13 +1,13 @@
-"""What each possible cause changes in a printer's readings, to first order about the answer."""
+"""Derivatives of a printer's readings by the parameters of each possible cause, about the answer."""
 
 import numpy as np
 
-# Ptt3's numbers of a leg
+# indices of Ptt3's parameters of a leg
 _SLIDER, _ARM, _RISE, _SWING = 0, 1, 4, 5
 
 
 def cause_columns(result):
-    """Change (n, k) of the readings of a PrinterFit by each cause, and the unit of its number where k is 1, by name.
+    """Derivatives (n, k) of the readings of a PrinterFit by each cause, and the unit where k is 1, by name.
 
     Arms, towers that lean (three angles outwards, three sideways), and carriages' steps of other lengths, per tower.
     With distances: calipers with a wrong scale or offset, and a measured object that is stretched along x, shrunk along
@@ -33,18 +33,18 @@ def cause_columns(result):
 
 
 def arm_columns(result):
-    """Change (n, 3) of the readings by the arms' lengths."""
+    """Derivatives (n, 3) of the readings by the arms' lengths."""
     return _by_place(result)[..., _ARM].sum(axis=1)
 
 
 def lean_columns(result):
-    """Change (n, 6) of the readings by towers that lean: three angles outwards, three sideways."""
+    """Derivatives (n, 6) of the readings by leaning towers: three angles outwards, three sideways."""
     by_leg = _by_place(result).sum(axis=1)
     return np.concatenate([by_leg[..., _RISE], by_leg[..., _SWING]], axis=1)
 
 
 def _by_place(result):
-    """Change (n, places, 3, 6) of the readings by the legs' numbers, of every place by itself."""
+    """Derivatives (n, places, 3, 6) of the readings by the legs' parameters, at every place separately."""
     residuals, deviations = result.residuals, result.fit.deviations
     places = residuals.places(deviations)
     moved = residuals.mechanism.leg_jacobian(places, residuals.actuators, deviations)

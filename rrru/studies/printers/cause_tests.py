@@ -1,14 +1,14 @@
-"""What a printer's readings say about a cause: how likely noise explains as much, whatever the noises' ratio is.
+"""Tests of causes on a printer's readings: probability that noise explains as much, for an unknown ratio of noises.
 
-A cause adds columns to the linear model about the answer, see `rrru.estimation.f_test`. The test needs the ratio of a
-height's noise to a distance's, which few readings tell: false alarms are up to six times too many where the firmware's
-ratio is wrong. For causes of the machine p is the largest over all ratios, which holds the level wherever between a
-quarter and 1 the true one is.
+A cause adds columns to the linear model about the answer, see `rrru.estimation.f_test`. The test needs the ratio of the
+noise of a height to that of a distance, which few readings determine poorly. With a wrong ratio in the firmware, false
+alarms are up to six times too frequent. For causes of the machine p is the largest over all ratios. This holds the
+level for every true ratio from 0.25 to 1.
 
-For a bad reading that would hide most of them: under a ratio that the other readings exclude, even one far off is
-likely. There p is the mean over ratios from 1/8 to 2, each as likely as the other readings make it; the ratio's
-logarithm is uniform beforehand. A reading is predicted from the others this way and does not judge its own noise. For
-each ratio from a quarter to 1 the level holds by simulation.
+For a bad reading the largest p would hide most of them: with a ratio that the other readings exclude, even a large
+error is likely. There p is the mean over ratios from 1/8 to 2, weighted by their likelihood from the other readings;
+the prior of the ratio's logarithm is uniform. In this way a reading is predicted from the others and does not affect
+its own noise. By simulation, the level holds for each ratio from 0.25 to 1.
 """
 
 from dataclasses import dataclass
@@ -22,17 +22,17 @@ from rrru.studies.printers.cause_columns import cause_columns
 from rrru.studies.printers.printer_fit import PrinterFit
 
 BAD_READING = "bad_reading"
-# ASSUME noise of a height over that of a distance: a probe is at best four times as good as calipers, at worst as bad
+# ASSUME noise of a height over that of a distance: a probe is one to four times as accurate as calipers
 _RATIOS = np.geomspace(0.25, 1.0, 4)
-# the same with a factor of 2 on either side, so that a mean holds the level at these ends too
+# wider by a factor of 2 on either side, so that a mean holds the level at these ends too
 _LIKELY_RATIOS = np.geomspace(0.125, 2.0, 9)
 _POWER, _DRAWS, _SEED = 0.9, 500, 1
 
 
 def noise_sds(residuals, ratios=_RATIOS):
-    """Standard deviations (n,) of ProbedHeights in proportion: by the firmware's ratio, then by others.
+    """Standard deviations (n,) of ProbedHeights in proportion: with the firmware's ratio, then with others.
 
-    Heights alone have one ratio.
+    Heights alone need no ratio.
     """
     height = np.arange(len(residuals)) < len(residuals.height_mm)
     return [1.0 / residuals.root_weight, *(np.where(height, ratio, 1.0) for ratio in ratios if not height.all())]
@@ -40,7 +40,7 @@ def noise_sds(residuals, ratios=_RATIOS):
 
 @dataclass(frozen=True)
 class CauseTests:
-    """The readings of a PrinterFit as a linear model about its answer, under every ratio of noises."""
+    """The readings of a PrinterFit as a linear model about its answer, for every ratio of noises."""
 
     result: PrinterFit
 
@@ -57,74 +57,76 @@ class CauseTests:
 
     @cached_property
     def _models(self):
-        """LinearizedModels of all ratios by which a cause is judged, and by which a bad reading is."""
+        """LinearizedModels of all ratios for a cause, and of all ratios for a bad reading."""
         likely = noise_sds(self.result.residuals, _LIKELY_RATIOS)
         both = noise_sds(self.result.residuals), likely[len(likely) > 1 :]
         return tuple([self.result.linearized(sd) for sd in sds] for sds in both)
 
     @property
-    def _own(self):
+    def _firmware_model(self):
         """The LinearizedModel of the firmware's ratio."""
         return self._models[0][0]
 
     @cached_property
     def added(self):
-        """AddedColumns of every cause by name, those of a bad reading last, under the firmware's ratio."""
-        return {name: self._own.add(block) for name, block in self._blocks.items()}
+        """AddedColumns of every cause by name, those of a bad reading last, for the firmware's ratio."""
+        return {name: self._firmware_model.add(block) for name, block in self._blocks.items()}
 
-    def p(self, name, readings=None, beside=None):
-        """Largest p over the ratios for a cause, (...) for readings (..., n), by default its own.
+    def p(self, name, readings=None, with_columns=None):
+        """Largest p over the ratios for a cause, (...) for readings (..., n), by default those of the printer.
 
-        Of a bad reading it is the mean (..., n), of every reading, times their number (Bonferroni). beside: columns
-        (n, k) that are fitted too.
+        Of a bad reading it is the mean (..., n), of every reading, times their number (Bonferroni). with_columns:
+        columns (n, k) that are also fitted.
         """
         readings = self.result.in_mm.residual if readings is None else np.moveaxis(readings, -1, 0)[:, None]
         bad, block = name == BAD_READING, self._blocks[name]
         models = self._models[bad]
-        if beside is not None:
-            models = [one.with_columns(beside[:, None]) for one in models]
+        if with_columns is not None:
+            models = [model.with_columns(with_columns[:, None]) for model in models]
         if not bad:
             return largest_p(models, block, readings)[0]
         return np.minimum(np.moveaxis(mean_p(models, block, readings), 0, -1) * len(readings), 1.0)
 
     def p_without_any(self, name):
         """Largest p of a cause with any single reading left out."""
-        return float(np.max([self.p(name, beside=column[:, None]) for column in np.eye(len(self.result.residuals))]))
+        return float(
+            np.max([self.p(name, with_columns=column[:, None]) for column in np.eye(len(self.result.residuals))])
+        )
 
     def explained_share(self, name, reading=0):
-        """Share of the sum of squares left that a cause holds, under the firmware's ratio; reading: as below."""
-        explained = self.added[name].explained(self._own.residual)[reading]
-        return min(explained / (self._own.residual**2).sum(), 1.0)
+        """Fraction of the residual sum of squares that a cause explains, firmware's ratio; reading: as below."""
+        explained = self.added[name].explained(self._firmware_model.residual)[reading]
+        return min(explained / (self._firmware_model.residual**2).sum(), 1.0)
 
-    def imitators(self, name, share, reading=0):
-        """Names of the other causes that hold a share of what a cause explains, under the firmware's ratio.
+    def confounded_causes(self, name, share, reading=0):
+        """Names of the other causes that explain a share of what a cause explains, for the firmware's ratio.
 
-        reading: that of a bad reading.
+        reading: number of a bad reading.
         """
         basis = self.added[name].basis[reading]
-        explained = basis @ (basis.T @ self._own.residual)
-        held = {other: one.explained(explained).max() for other, one in self.added.items() if other != name}
+        explained = basis @ (basis.T @ self._firmware_model.residual)
+        held = {other: added.explained(explained).max() for other, added in self.added.items() if other != name}
         return tuple(other for other, part in held.items() if basis.size and part >= share * (explained @ explained))
 
-    def always_imitated(self, name, share):
-        """Whether another cause holds that share of everything that a cause can explain, under the firmware's ratio."""
+    def always_confounded(self, name, share):
+        """Whether another cause explains that share of all that a cause can explain, for the firmware's ratio."""
         others = [self.added[other].basis[0] for other in self.columns if other != name]
-        wide = [one for one in others if one.shape[1] >= self.added[name].rank > 0]
+        wide = [basis for basis in others if basis.shape[1] >= self.added[name].rank > 0]
         bases = self.added[name].basis
-        return all(any(np.linalg.norm(one.T @ basis, -2) ** 2 >= share for one in wide) for basis in bases)
+        return all(any(np.linalg.norm(other.T @ basis, -2) ** 2 >= share for other in wide) for basis in bases)
 
     def estimate(self, name):
-        """Number of a cause with a single column, and its standard error, under the firmware's ratio; else NaN."""
+        """Estimate of a cause with a single parameter, and its standard error, for the firmware's ratio; else NaN."""
         added = self.added[name]
         if self._blocks[name].shape[2] > 1 or not added.rank or added.freedom < 1:
             return np.nan, np.nan
         return tuple(one.item() for one in added.estimates())
 
     def detectable_mm(self, name, limit):
-        """Rms in mm over the readings of what the calibration does not absorb of a cause that shows, 9 times of 10.
+        """Smallest size of a cause with a power of 0.9: rms in mm over the readings, without its absorbed part.
 
-        That is, has p below a limit. By simulation with the fit's noise in the firmware's ratio and causes in random
-        directions; of a bad reading the error of a random one. NaN where no size does.
+        The power is the probability of p below a limit. By simulation with the fit's noise in the firmware's ratio and
+        causes in random directions; for a bad reading the error of a random one. NaN where no size has this power.
         """
         generator, sd = np.random.default_rng(_SEED), noise_sds(self.result.residuals)[0]
         noise = generator.normal(size=(_DRAWS, len(sd))) * self.result.fit.noise_mm * sd

@@ -1,4 +1,4 @@
-"""`rrru-printer`: what a delta printer's own file says of its calibration, on the terminal and in a page."""
+"""`rrru-printer`: check of a delta printer's calibration from its own file, on the terminal and in a page."""
 
 import argparse
 import sys
@@ -39,7 +39,7 @@ def main(arguments=None):
     try:
         answers = answers_of(options.files)
     except RrruError as error:
-        # what an earlier run has left must not look like this one's
+        # replaces the page of an earlier run
         _write(options.page, [failed("no answer", str(error))])
         sys.exit(f"{type(error).__name__}: {error}")
     _write(options.page, answers)
@@ -55,7 +55,7 @@ def _write(path, answers):
         try:
             Path(path).write_text(page, encoding="utf-8")
         except OSError as error:
-            sys.exit(f"{path}: cannot be written ({error.strerror}); allowed: a file in a folder that can be")
+            sys.exit(f"{path}: cannot be written ({error.strerror}); allowed: a file in a writable folder")
 
 
 def _parser():
@@ -65,21 +65,21 @@ def _parser():
         description="Check the calibration of delta printers.",
         epilog=f"Run it in any folder. Its settings are the section printers of {_CONFIG}",
     )
-    told = "Klipper's printer.cfg, or JSON as docs/printers.md describes it"
-    parser.add_argument("files", nargs="+", metavar="FILE", help=told)
-    parser.add_argument("--page", metavar="FILE.html", help="write the answer into a page, too")
+    files_help = "Klipper's printer.cfg, or JSON as in docs/printers.md"
+    parser.add_argument("files", nargs="+", metavar="FILE", help=files_help)
+    parser.add_argument("--page", metavar="FILE.html", help="also write the answer to a page")
     return parser
 
 
 def answers_of(paths):
     """The Answer for every printer of the files.
 
-    Raises IngestError where none of them can be read, and ConfigError where the project's settings are not there.
+    Raises IngestError where none of them can be read, and ConfigError where the project's settings are missing.
     """
     try:
         settings = yaml.safe_load(_CONFIG.read_text(encoding="utf-8"))["printers"]
     except OSError as error:
-        allowed = "rrru installed with pip install -e from its project's folder, where the settings stand"
+        allowed = "rrru installed with pip install -e from its project's folder, which has the settings"
         raise ConfigError(f"{_CONFIG}: cannot be read ({error.strerror}); allowed: {allowed}") from error
     printers = read_all(paths)
     level = level_of([printer for printer in printers if not isinstance(printer, Refused)], settings)

@@ -1,17 +1,19 @@
-"""Unequal rods of an arm tilt the platform, and a probe beside the nozzle takes the tilt for the bed's shape.
+"""Test for a tilted effector: unequal rods of an arm tilt the platform, and a probe at an offset reads a bed shape.
 
-Where the two rods of arm i, a distance s apart along the tangent t_i, differ in length by d_i, the platform turns by w
-and its point in the joints' plane moves by v, to first order (n_i: down the arm, u_i: to its joints, r: how far)
+Where the two rods of arm i, a distance s apart along the tangent t_i, differ in length by d_i, the platform rotates by
+w and its point in the joints' plane moves by v, to first order (n_i: down the arm, u_i: to its joints at the distance
+r)
 
     (t_i x n_i) . w = d_i / s,    n_i . v = -r n_i . (w x u_i)
 
-A probe at the offset o stands v_z + (w x o)_z higher than the platform says. All else that is smooth over the bed may
-look like it: arms of other lengths than saved, leaning towers, a bed bent to second order, the probe's own zero.
-A bed's slope is a gradient and the tilt is none, so that probing on three sides of the nozzle tells them apart. All of
-them are fitted beside the tilt, and F says how likely noise explains as much as the tilt then does, see
-`cause_tests`. Whether readings can tell is known before: it is the probability that 0.1 mm on any one arm passes.
+A probe at the offset o is v_z + (w x o)_z higher than in the model. Every effect that is smooth over the bed may be
+confounded with it: arms of other lengths than saved, leaning towers, a bed bent to second order, the zero of the probe.
+The slope of a bed is a gradient and the tilt is not, so that probing on three sides of the nozzle separates them. All
+of them are fitted together with the tilt, and an F test gives the probability that noise explains as much as the tilt,
+see `cause_tests`. The power of the readings is known before the test: the probability that 0.1 mm on any one arm
+passes.
 
-# ASSUME rods as far apart and joints as far out as those of `rrru.robots.linear_delta`, the nozzle in the joints' plane
+# ASSUME distances of rods and joints as in `rrru.robots.linear_delta`, the nozzle in the joints' plane
 """
 
 from dataclasses import dataclass, replace
@@ -29,22 +31,22 @@ from rrru.studies.printers.cause_columns import arm_columns, lean_columns
 from rrru.studies.printers.cause_tests import noise_sds
 from rrru.studies.printers.printer_fit import PrinterFit
 
-# the difference of an arm's rods that readings have to show
+# the difference of an arm's rods for which the power is computed
 SHOWN_MM = 0.1
-# ASSUME how well a probe repeats, where the readings do not tell
+# ASSUME repeatability of a probe, where the readings do not determine it
 PROBE_MM = 0.01
-# ASSUME a bed bends by about a millimetre, and the probe's zero is as well known where it was moved: 1 sigma
+# ASSUME prior s.d. of the bed's bending, and of the zero of a probe that was moved
 BED_MM = 1.0
-# a micrometre: readings without noise leave less
+# lower limit of the noise, for simulated readings without noise
 _LEAST_NOISE_MM = 1e-3
 _CONFIDENCE = 0.95
-# ASSUME noise of a height touched by hand, over that of a probed one
-_HAND = (1.0, 2.0, 4.0)
+# ASSUME noise of a height measured by hand, over that of a probed one
+_BY_HAND = (1.0, 2.0, 4.0)
 
 
 def tilts(robot, places, actuators, deviations):
-    """Turn (n, 3, 3) in rad and shift (n, 3, 3) in mm of the platform at places (n, 3), per mm that each arm's rods
-    differ by.
+    """Rotation (n, 3, 3) in rad and translation (n, 3, 3) in mm of the platform at places (n, 3), per mm of difference
+    between each arm's rods.
     """
     arms = robot.link_directions(places, actuators, deviations)
     turn = np.linalg.inv(np.cross(robot.tangent, arms)) / robot.spacing_mm
@@ -54,7 +56,7 @@ def tilts(robot, places, actuators, deviations):
 
 @dataclass(frozen=True)
 class TiltTest:
-    """The test of a PrinterFit for an effector that tilts.
+    """The test of a PrinterFit for a tilted effector.
 
     probe_mm (n, 2): offsets of the probe at the heights. noise_mm: of a reading of weight 1, by default from the
     readings.
@@ -66,12 +68,12 @@ class TiltTest:
 
     @cached_property
     def places(self):
-        """Where the nozzle stands, see `ProbedHeights.places`."""
+        """Places of the nozzle, see `ProbedHeights.places`."""
         return self.result.residuals.places(self.result.fit.deviations)
 
     @cached_property
     def columns(self):
-        """Change (n, 3) of the readings per mm that the rods of each arm differ by."""
+        """Derivative (n, 3) of the readings by the difference of each arm's rods, per mm."""
         residuals, heights = self.result.residuals, len(self.probe_mm)
         turn, shift = tilts(residuals.mechanism, self.places, residuals.actuators, self.result.fit.deviations)
         changes = np.einsum("rna,nak->rk", residuals.gradient(self.places), shift)
@@ -81,13 +83,13 @@ class TiltTest:
 
     @cached_property
     def rivals(self):
-        """Change (n, k) of the readings by all that may look like a tilt."""
+        """Derivatives (n, k) of the readings by the effects that are confounded with a tilt."""
         arms = () if len(self.result.residuals.distance_mm) else (arm_columns(self.result),)
         return np.concatenate([*arms, lean_columns(self.result), self.bed], axis=1)
 
     @cached_property
     def bed(self):
-        """Change (n, k) of the readings by the zero of every place of the probe, and by three shapes of the bed."""
+        """Derivatives (n, k) of the readings by the zero of every probe offset, and by three shapes of the bed."""
         kinds = np.unique(self.probe_mm, axis=0)
         zeros = (self.probe_mm[:, None] == kinds[1:]).all(axis=2).astype(float)
         x, y = (self.places[: len(self.probe_mm), :2] + self.probe_mm).T
@@ -97,7 +99,7 @@ class TiltTest:
     def with_bent_bed(self):
         """The test about the answer of a joint estimation with the bed's bending.
 
-        An answer that took the bed for flat turns and stretches the places under the probe.
+        An answer for a flat bed would rotate and stretch the places under the probe.
         """
         result, residuals = self.result, self.result.residuals
         columns = (self.bed * residuals.root_weight[:, None])[:, None]
@@ -115,41 +117,41 @@ class TiltTest:
 
     @cached_property
     def _models(self):
-        """LinearizedModels with all rivals, under all ratios of noises: of heights to distances, and by hand to probed.
+        """LinearizedModels with all rivals, for all ratios of noises: heights to distances, and by hand to probed.
 
-        The first has the firmware's ratio and the middle one of the hand's.
+        The first has the firmware's ratio and the middle ratio of heights by hand.
         """
         touched = (self.probe_mm == 0.0).all(axis=1)
-        hands = _HAND if touched.any() and not touched.all() else (1.0,)
+        ratios = _BY_HAND if touched.any() and not touched.all() else (1.0,)
         by_hand = self._of_heights(touched[:, None])[:, 0]
-        sds = [sd * np.where(by_hand, hand, 1.0) for sd in noise_sds(self.result.residuals) for hand in hands]
-        own = sds.pop(len(hands) // 2)
-        return [self.result.linearized(sd).with_columns(self.rivals[:, None]) for sd in (own, *sds)]
+        sds = [sd * np.where(by_hand, ratio, 1.0) for sd in noise_sds(self.result.residuals) for ratio in ratios]
+        middle = sds.pop(len(ratios) // 2)
+        return [self.result.linearized(sd).with_columns(self.rivals[:, None]) for sd in (middle, *sds)]
 
     @cached_property
-    def _own(self):
-        """AddedColumns of the tilt under the firmware's ratio and the middle one of the hand's."""
+    def _tilt_columns(self):
+        """AddedColumns of the tilt for the firmware's ratio and the middle ratio of heights by hand."""
         return self._models[0].add(self.columns[:, None])
 
     @cached_property
     def noise(self):
-        """Noise in mm of a reading of weight 1: as given, of what neither rivals nor tilt explain, or a probe's."""
+        """Noise in mm of a reading of weight 1: as given, from residuals with rivals and tilt, or of a probe."""
         if self.noise_mm is not None:
             return self.noise_mm
-        freedom = self._own.freedom
-        return np.sqrt(self._own.unexplained()[0] / freedom) if freedom > 0 else PROBE_MM
+        freedom = self._tilt_columns.freedom
+        return np.sqrt(self._tilt_columns.unexplained()[0] / freedom) if freedom > 0 else PROBE_MM
 
     @cached_property
     def most_noise(self):
-        """What the noise is below with a confidence of 95 %: few readings promise too little of it."""
-        freedom = self._own.freedom
+        """Upper 95 % confidence limit of the noise, since few readings tend to underestimate it."""
+        freedom = self._tilt_columns.freedom
         if self.noise_mm is not None or freedom < 1:
             return self.noise
         return self.noise * np.sqrt(freedom / stats.chi2.ppf(1.0 - _CONFIDENCE, freedom))
 
     @cached_property
     def p(self):
-        """Probability that noise explains as much as unequal rods do; NaN without freedom."""
+        """Probability that noise explains as much as unequal rods; NaN without degrees of freedom."""
         return self._p(self._models, self.columns)
 
     def _p(self, models, columns):
@@ -158,17 +160,17 @@ class TiltTest:
         return float(largest_p(models, columns[:, None], self.result.in_mm.residual)[0]) if len(ranks) == 1 else np.nan
 
     def power(self, limit):
-        """Probability that p is below a limit where one arm's rods differ by SHOWN_MM, of the arm that shows it worst.
+        """Probability that p is below a limit where one arm's rods differ by SHOWN_MM, for the least sensitive arm.
 
-        Under `most_noise`.
+        For a noise of `most_noise`.
         """
-        if self._own.freedom < 1 or self._own.rank < self.columns.shape[1]:
+        if self._tilt_columns.freedom < 1 or self._tilt_columns.rank < self.columns.shape[1]:
             return 0.0
-        return float(self._own.power(limit, SHOWN_MM * self.columns[:, None], self.most_noise).min())
+        return float(self._tilt_columns.power(limit, SHOWN_MM * self.columns[:, None], self.most_noise).min())
 
     def alone(self, arm):
-        """How much an arm's rods differ in mm if only they do, its standard error, and p of the other arms beside."""
+        """Difference of an arm's rods in mm if only they differ, its standard error, and p of the other arms."""
         column = self.columns[:, [arm]]
         size, error = self._models[0].add(column[:, None]).estimates(self.noise)
-        beside = [one.with_columns(column[:, None]) for one in self._models]
-        return abs(size.item()), error.item(), self._p(beside, np.delete(self.columns, arm, axis=1))
+        with_arm = [model.with_columns(column[:, None]) for model in self._models]
+        return abs(size.item()), error.item(), self._p(with_arm, np.delete(self.columns, arm, axis=1))

@@ -1,4 +1,4 @@
-"""Linear-delta printers on one page: whose saved answer belongs, what is left, and how well arms are known."""
+"""Figure of linear-delta printers: saved against fitted answers, residuals, and uncertainty of the arms."""
 
 import numpy as np
 
@@ -20,10 +20,10 @@ _ROW_MM, _AROUND_MM, _HIGHEST_MM = 4.4, 34.0, 238.0
 
 @style.printed
 def printers(tables, options):
-    """Linear-delta printers calibrated from what their owners measured. (a) Largest difference between the numbers
+    """Linear-delta printers calibrated from their owners' measurements. (a) Largest difference between the numbers
     that their firmware saved and ours; diamonds: readings and saved answer do not belong together. (b) Rms
-    residuals of probed heights and caliper distances under our answer and the saved one. (c) Standard error of an
-    arm's length with distances, and of the arms' common length if heights alone had to give it.
+    residuals of probed heights and caliper distances for our answer and the saved one. (c) Standard error of an
+    arm's length with distances, and of the arms' common length from heights alone.
     """
     frame = tables["printers"]
     frame = frame[frame["verdict"].isin(_VERDICTS)].reset_index(drop=True)
@@ -44,7 +44,7 @@ def printers(tables, options):
 
 
 def _decades(low, high):
-    """Limits of a log axis at whole decades, off the data by a margin, so that few data have two labelled ticks too."""
+    """Limits of a log axis at whole decades with a margin, so that few data have two labelled ticks too."""
     return 10.0 ** np.floor(np.log10(low) - _MARGIN), 10.0 ** np.ceil(np.log10(high) + _MARGIN)
 
 
@@ -54,7 +54,7 @@ def _differences(axes, frame, rows):
         chosen = (frame["verdict"] == verdict).to_numpy()
         _marks(axes, frame["largest_difference"][chosen], rows[chosen], f"answer {verdict}", look)
     axes.set(xlabel="largest difference (mm) or (deg)")
-    axes.set_title("(a) saved answer less ours")
+    axes.set_title("(a) saved minus fitted answer")
 
 
 def _residuals(axes, frame, rows):
@@ -63,11 +63,11 @@ def _residuals(axes, frame, rows):
         _marks(axes, frame[f"{kind}_rms_saved_mm"], rows, f"{kind}s, saved", look | _OPEN | {"markersize": 4.5})
         _marks(axes, frame[f"{kind}_rms_fitted_mm"], rows, f"{kind}s, ours", look)
     axes.set(xlabel="rms residual (mm)")
-    axes.set_title("(b) what is left")
+    axes.set_title("(b) residuals")
 
 
 def _arms(axes, frame, rows):
-    """Standard error of an arm with distances, and of the common length if its heights, or 100, had to give it."""
+    """Standard error of an arm with distances, and of the common length from its heights alone, or from 100."""
     columns = (
         ("arm_standard_error_mm", "an arm, with distances", style.ORANGE, "s"),
         ("common_arm_standard_error_mm", "all arms, heights alone", style.BLUE, "s"),
@@ -76,7 +76,7 @@ def _arms(axes, frame, rows):
     for column, label, colour, marker in columns:
         _marks(axes, frame[column], rows, label, _OPEN | {"color": colour, "marker": marker})
     axes.set(xlabel="standard error (mm)")
-    axes.set_title("(c) how well arms are known")
+    axes.set_title("(c) uncertainty of the arms")
 
 
 def _marks(axes, values, rows, label, look):

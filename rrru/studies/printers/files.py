@@ -1,4 +1,4 @@
-"""Printers' files of every form: the printers' JSON, Klipper's printer.cfg, what RepRapFirmware says and is told."""
+"""Printers' files of every form: the printers' JSON, Klipper's printer.cfg, commands of RepRapFirmware."""
 
 from collections import Counter
 from pathlib import Path
@@ -23,8 +23,8 @@ def read(path, name=None):
 def read_all(paths):
     """Printers of several files, a tuple; a file that cannot be read is a `Refused` under its name.
 
-    Files of one name are called by their paths. Raises IngestError where no printer of any file can be read, or where a
-    name occurs twice.
+    Files of the same name are named by their paths. Raises IngestError where no printer of any file can be read, or
+    where a name occurs twice.
     """
     stems, printers = Counter(Path(path).stem for path in paths), []
     for path in paths:
@@ -38,5 +38,5 @@ def read_all(paths):
     twice = [name for name, count in Counter(printer.name for printer in printers).items() if count > 1]
     if twice:
         problem = {"file": ", ".join(str(path) for path in paths), "value": f"the id {twice[0]} twice"}
-        raise IngestError([problem | {"allowed": "an id per printer"}])
+        raise IngestError([problem | {"allowed": "a different id for each printer"}])
     return tuple(printers)

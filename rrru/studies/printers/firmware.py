@@ -1,13 +1,13 @@
 """Numbers that a printer's firmware calibrates: radius, angles of towers a and b, endstops, with distances the arms.
 
-The angle of tower c is the gauge: the base turns freely. The firmware minimises the sum of squares over these numbers
-and stops where steps of a size that it states no longer help any of them. Where that stop can lie is known without
-knowing its path: with the Hessian H of the cost in these numbers, each of which is within the step s of its best value,
+A rotation of the base is not identifiable, so that the angle of tower c is fixed. The firmware minimises the sum of
+squares by coordinate steps and stops where steps of a stated size s improve no number. The Hessian H of the cost bounds
+the error of this stop, without knowledge of its path:
 
     |saved - best|_i <= s sum_j |H^-1|_ij H_jj
 
-A saved number beyond this, and beyond its own rounding, was not found from these readings. The firmware saves six
-decimals; three of the endstops, where it applies a Z offset to them.
+A saved number with a larger error, beyond its own rounding, was not found from these readings. The firmware saves six
+decimals, but three for endstops with an applied Z offset.
 """
 
 import numpy as np
@@ -16,15 +16,15 @@ from rrru.estimation.observations.probed_heights import ProbedHeights
 
 NAMES = ("radius", "angle_a", "angle_b", "endstop_a", "endstop_b", "endstop_c", "arm_a", "arm_b", "arm_c")
 UNITS = ("mm", "deg", "deg", *("mm",) * 6)
-# the firmware's weights: all squared heights together count twice as much as all squared distances
+# the firmware's weights: total weight of the heights over that of the distances
 _HEIGHTS_COUNT = 2.0
 _SAVED, _OFFSET = 5e-7, 5e-4
 
 
 def residuals_of(printer, parameter_set=None):
-    """Residuals of a printer's readings with the firmware's weights; by default of the parameters they calibrate."""
+    """Residuals of a printer's readings with the firmware's weights; by default for the parameters they calibrate."""
     distances, probed = len(printer.distance_mm), np.count_nonzero(~printer.by_hand)
-    # heights entered by hand beside probed ones are not counted
+    # heights entered by hand in addition to probed ones are not counted
     heights = probed or len(printer.height_mm)
     weight = _HEIGHTS_COUNT * distances / heights if distances else 1.0
     ways = -printer.height_drop_mm, printer.height_mm, -printer.distance_drop_mm, printer.distance_mm
@@ -55,6 +55,6 @@ def own_jacobian(residuals, deviations):
 
 
 def stop(jacobian, step):
-    """How far (p,) from the best numbers a program can stop whose steps no longer help; jacobian (n, p)."""
+    """Largest errors (p,) at which the coordinate search of a step can stop; jacobian (n, p)."""
     hessian = jacobian.T @ jacobian
     return step * np.abs(np.linalg.inv(hessian)) @ np.diag(hessian)

@@ -1,4 +1,4 @@
-"""All that one printer's readings say: its calibration, a suspicious reading, causes, an effector that tilts."""
+"""Results of one printer's readings: calibration, suspicious reading, causes, tilted effector."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -17,7 +17,7 @@ REPRODUCED, FOREIGN, UNTRIED, FAILED = "reproduced", "does not belong", "not cal
 
 @dataclass(frozen=True)
 class Judged:
-    """A printer's fit, every reading against the others, its causes, and the tilt where a probe sits beside the nozzle.
+    """A printer's fit, its leave-one-out residuals, its causes, and the tilt where the probe has an offset.
 
     reason: why its saved answer does not belong; empty where it does.
     """
@@ -38,12 +38,12 @@ class Judged:
 
     @cached_property
     def suspect(self):
-        """Number from 0 of the reading that noise hardly explains, None where there is none."""
+        """Number from 0 of the reading with p below the limit, None where there is none."""
         return self.left.suspect if self.causes[0].p < self.causes[0].limit else None
 
     @property
     def flagged(self):
-        """Whether the suspicious reading is found to be bad."""
+        """Whether the verdict on the suspicious reading is a bad reading."""
         return self.suspect is not None and self.causes[0].verdict == FOUND
 
     @cached_property
@@ -53,7 +53,7 @@ class Judged:
 
     @property
     def cause(self):
-        """What the causes say together."""
+        """The overall answer on the causes."""
         return diagnosis(self.causes)
 
 

@@ -1,8 +1,8 @@
 """Klipper's printer.cfg as the printers' JSON form: the owner's settings and the block that SAVE_CONFIG wrote.
 
-A setting that stands above the block wins over the saved one, as in Klipper. Absent settings are Klipper's: 200 full
-steps a turn, towers at 210, 330 and 90 degrees, tower a's arm and endstop for the others. Files of before 2021 state
-`step_distance` instead of rotation distance and microsteps. `[include ..]` is followed where the file is there.
+A setting above the block overrides the saved one, as in Klipper. Absent settings have Klipper's defaults: 200 full
+steps per turn, towers at 210, 330 and 90 degrees, arm and endstop of tower a for the others. Files from before 2021
+have `step_distance` instead of rotation distance and microsteps. `[include ..]` is followed where the file exists.
 """
 
 import configparser
@@ -11,14 +11,14 @@ from pathlib import Path
 from rrru.errors import IngestError
 
 _ANGLES = {"a": 210.0, "b": 330.0, "c": 90.0}
-_BLOCK, _MOST = "#*#", 1000
-# sections of probes; each may carry a name of its own after it
+_BLOCK, _MAX_READINGS = "#*#", 1000
+# sections of probes; each may be followed by a name
 _PROBES = ("probe", "bltouch", "smart_effector", "probe_eddy_current", "load_cell_probe", "dockable_probe")
 _PROBES += ("scanner", "beacon", "cartographer", "klicky")
 
 
 def entry(path, name):
-    """The printer of a printer.cfg as an entry of the JSON form; raises IngestError with every problem that it has."""
+    """The printer of a printer.cfg as an entry of the JSON form; raises IngestError with all its problems."""
     settings = _Settings(path)
     if settings.text("printer", "kinematics") not in (None, "delta"):
         settings.refuse("printer: kinematics", settings.text("printer", "kinematics"), "delta")
@@ -27,13 +27,13 @@ def entry(path, name):
     offset = _probe_offset(settings)
     heights = _heights(settings, "height", None if offset is None else offset[:2])
     if offset is not None and offset[2] != 0.0:
-        # Klipper saves the probe's z_offset for every probed height, and 0 where the nozzle touched by itself
+        # Klipper saves the probe's z_offset for every probed height, and 0 where the nozzle itself touched
         heights = [one | ({"probe_offset_mm": [0.0, 0.0]} if one["z_mm"] == 0.0 else {}) for one in heights]
-    # entered by DELTA_ANALYZE MANUAL_HEIGHT; Klipper keeps them before the probed ones
+    # entered by DELTA_ANALYZE MANUAL_HEIGHT; Klipper places them before the probed ones
     heights = _heights(settings, "manual_height", [0.0, 0.0]) + heights
     if not heights:
-        told = "the heights that DELTA_CALIBRATE probes and SAVE_CONFIG saves"
-        settings.refuse("delta_calibrate: height0", "nothing", told)
+        allowed = "the heights that DELTA_CALIBRATE probes and SAVE_CONFIG saves"
+        settings.refuse("delta_calibrate: height0", "nothing", allowed)
     settings.finish()
     saved = {"id": name, "source": str(path), "radius_mm": radius, "towers": towers}
     return saved | {"heights": heights, "distances": _distances(settings)}
@@ -58,7 +58,7 @@ def _tower(settings, tower):
 
 def _probe_offset(settings):
     """Offset of the probe from the nozzle in x, y and z, None without a probe."""
-    section = next((one for one in settings.sections if one.split()[0] in _PROBES), None)
+    section = next((name for name in settings.sections if name.split()[0] in _PROBES), None)
     return section and [settings.number(section, f"{axis}_offset", 0.0) for axis in "xyz"]
 
 
@@ -77,7 +77,7 @@ def _distances(settings):
 
 
 class _Settings:
-    """Settings of a printer.cfg by section and option, and what is wrong with them."""
+    """Settings of a printer.cfg by section and option, and their problems."""
 
     def __init__(self, path):
         self._path, self._problems = path, []
@@ -97,8 +97,8 @@ class _Settings:
         try:
             parser.read_string("\n".join(lines), source=str(self._path))
         except configparser.Error as error:
-            told = str(error).replace("\n", " ")
-            self.refuse(None, f"no printer.cfg ({told})", "sections of options, as Klipper reads them")
+            reason = str(error).replace("\n", " ")
+            self.refuse(None, f"no printer.cfg ({reason})", "sections of options, as Klipper reads them")
             self.finish()
         return {section: dict(parser[section]) for section in parser.sections()}
 
@@ -113,11 +113,11 @@ class _Settings:
             raise IngestError(self._problems)
 
     def text(self, section, option):
-        """A setting as it stands, None where it is not there."""
+        """The text of a setting, None for a missing one."""
         return self.sections.get(section, {}).get(option)
 
     def number(self, section, option, otherwise=None):
-        """A setting as a number; where it is not there another one, without which it is noted as missing."""
+        """A setting as a number; a missing one has the default `otherwise`, without which it is noted as missing."""
         text = self.text(section, option)
         if text is None:
             if otherwise is None:
@@ -130,9 +130,9 @@ class _Settings:
             return None
 
     def readings(self, option, places):
-        """Number, size and places of every reading of one kind in [delta_calibrate], as far as they count up."""
+        """Number, size and places of every reading of one kind in [delta_calibrate], up to the first missing number."""
         section = "delta_calibrate"
-        for number in range(_MOST):
+        for number in range(_MAX_READINGS):
             name = f"{option}{number}"
             if self.text(section, name) is None:
                 return
@@ -172,5 +172,5 @@ def _lines(path, seen):
 
 
 def _unread(path, column, value, allowed):
-    """The IngestError of a file, or of a line in it, that leads nowhere."""
+    """The IngestError of a file, or of a line in it, that cannot be read."""
     return IngestError([{"file": str(path), "row": None, "column": column, "value": value, "allowed": allowed}])

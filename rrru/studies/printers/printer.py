@@ -1,4 +1,4 @@
-"""A linear-delta printer: its numbers as saved, and what its owner measured."""
+"""A linear-delta printer: its saved numbers, and the measurements of its owner."""
 
 from dataclasses import dataclass
 
@@ -10,11 +10,11 @@ from rrru.robots.linear_delta import linear_delta
 
 @dataclass(frozen=True)
 class Printer:
-    """One printer: numbers as saved per tower a, b, c, readings, and carriages' ways down from the endstops in mm.
+    """One printer: saved numbers per tower a, b, c, readings, and carriage displacements down from the endstops in mm.
 
     angle_deg, arm_mm, endstop_mm, step_mm: (3,). height_mm: (n,), height_drop_mm: (n, 3). distance_mm: (m,),
-    distance_drop_mm: (m, 2, 3). probe_mm: (n, 2), where the probe sat beside the nozzle in x and y; 0 where the nozzle
-    touched by itself, NaN where nobody says. calibrated: whether the saved numbers are said to be these readings'.
+    distance_drop_mm: (m, 2, 3). probe_mm: (n, 2), offset of the probe from the nozzle in x and y; 0 where the nozzle
+    itself touched, NaN where not stated. calibrated: whether the saved numbers are stated to be from these readings.
     """
 
     name: str
@@ -33,12 +33,12 @@ class Printer:
 
     @property
     def parameter_set(self):
-        """Which numbers its readings calibrate: "distances" where there are any, else "heights"."""
+        """The parameters that its readings calibrate: "distances" where there are any, otherwise "heights"."""
         return "distances" if len(self.distance_mm) else "heights"
 
     @property
     def by_hand(self):
-        """Which heights (n,) the nozzle touched by itself."""
+        """Flags (n,) of the heights that the nozzle itself touched."""
         return (self.probe_mm == 0.0).all(axis=1)
 
     def mechanism(self, parameter_set=None):
@@ -57,5 +57,5 @@ class Refused:
 
     @property
     def reason(self):
-        """What is wrong with it, in one line."""
+        """Its problems in one line."""
         return str(IngestError(self.problems)).replace("\n", "; ")

@@ -1,9 +1,10 @@
-"""What the calibration of a printer leaves: which reading is suspicious, which causes could be behind it.
+"""Residuals of the calibration of a printer: suspicious reading and possible causes.
 
-Left-out readings: the printer is fitted without one reading, and this reading's distance from what the others foretell,
-over its standard error, follows Student's t with the others' freedom if all is well (Cook and Weisberg, Residuals and
-Influence in Regression, 1982, 2.2). Causes: `cause_tests` gives p. A cause that passes is found only if no other cause
-could explain what it explains, and if it passes without any single reading too; else it is not decidable.
+Leave-one-out: the printer is fitted without one reading. The difference of this reading from the prediction, over its
+standard error, follows Student's t with the degrees of freedom of the others if all readings are sound (Cook and
+Weisberg, Residuals and Influence in Regression, 1982, 2.2). Causes: `cause_tests` gives p. A cause that passes is found
+only if it is not confounded with another one and if it also passes without any single reading. Otherwise it is not
+decidable.
 """
 
 from dataclasses import dataclass, replace
@@ -19,11 +20,11 @@ ONE_READING = "not decidable (rests on one reading)"
 
 @dataclass(frozen=True)
 class LeftOut:
-    """Every reading against the fit of the others.
+    """Leave-one-out residual of every reading.
 
-    difference_mm (n,): reading less what they foretell. ratio (n,): that over its standard error, under the firmware's
-    ratio of noises. p (n,): of so large a ratio anywhere among the readings; see `cause_tests`. The last two are NaN
-    where the others leave no freedom.
+    difference_mm (n,): reading minus prediction from the others. ratio (n,): that over its standard error, for the
+    firmware's ratio of noises. p (n,): of so large a ratio anywhere among the readings; see `cause_tests`. The last two
+    are NaN without degrees of freedom.
     """
 
     difference_mm: np.ndarray
@@ -32,7 +33,7 @@ class LeftOut:
 
     @property
     def suspect(self):
-        """Number of the most suspicious reading, from 0; None where nothing tells."""
+        """Number of the most suspicious reading, from 0; None without degrees of freedom."""
         return None if np.isnan(self.p).all() else int(np.lexsort((-np.abs(self.ratio), self.p))[0])
 
 
@@ -57,11 +58,12 @@ def without(result, reading):
 
 @dataclass(frozen=True)
 class Cause:
-    """One possible cause of what a calibration leaves.
+    """One possible cause of the residuals of a calibration.
 
-    freedom_used: numbers that it adds. explained_share: of the sum of squares left, under the firmware's ratio of
-    noises. p: that noise would explain as much; NaN without freedom. estimate, standard_error: in `unit`, NaN but for
-    causes with one number. imitated_by: causes that hold what it explains. limit: that p has to be below.
+    freedom_used: number of its parameters. explained_share: explained fraction of the residual sum of squares, for the
+    firmware's ratio of noises. p: that noise explains as much; NaN without degrees of freedom. estimate,
+    standard_error: in `unit`, NaN except for causes with one parameter. imitated_by: confounded causes. limit: upper
+    limit of p.
     """
 
     cause: str
@@ -78,10 +80,10 @@ class Cause:
 
 @dataclass(frozen=True)
 class Level:
-    """How surely a cause has to show.
+    """Significance level of the causes.
 
-    level: probability of a false alarm over the causes of all `pieces` of evidence; imitated_from: share of what a
-    cause explains, from which on another that holds it imitates it.
+    level: probability of a false alarm over the causes of all `pieces` of evidence; imitated_from: least fraction of a
+    cause's explained part that a confounded cause explains too.
     """
 
     level: float
@@ -89,50 +91,52 @@ class Level:
     pieces: int = 1
 
     def limit(self, tests, name, more=0):
-        """P below which a cause passes: the level over the number of causes (Bonferroni), and of more beside them.
+        """Upper limit of p: the level over the number of causes (Bonferroni), plus `more` further tests.
 
-        A cause of the machine is asked for over all pieces of evidence together, so that the level is divided by their
-        number too; a bad reading is a matter of its own file.
+        Causes of the machine are tested over all pieces of evidence together, so that the level is also divided by
+        their number. A bad reading concerns its own file only.
         """
         return self.level / (1 + more + len(tests.columns)) / (1 if name == BAD_READING else self.pieces)
 
 
 def causes(result, left, level):
-    """Possible causes of what a PrinterFit leaves, a tuple: a bad reading, and those that act on all of them.
+    """Possible causes of the residuals of a PrinterFit, a tuple: a bad reading, and those that act on all readings.
 
-    left: its LeftOut; level: `Level`. A bad reading that is more striking than every other cause is left out before
-    these are looked at; one that is less striking has to stand out beside the most striking of them.
+    left: its LeftOut; level: `Level`. A bad reading with a smaller p than every other cause is removed before these are
+    tested. Otherwise it is tested together with the cause of the smallest p.
     """
     tests = CauseTests(result)
     first, others = _bad_reading(tests, left, level), _acting_on_all(tests, level)
     leader = min(others, key=lambda one: np.nan_to_num(one.p, nan=1.0))
     if first.p < first.limit and leader.p < first.p:
-        p = float(np.min(tests.p(BAD_READING, beside=tests.columns[leader.cause][0])))
+        p = float(np.min(tests.p(BAD_READING, with_columns=tests.columns[leader.cause][0])))
         first = replace(first, p=p, verdict=_verdict(p, first.imitated_by, first.limit))
     elif first.p < first.limit:
         others = _acting_on_all(CauseTests(without(result, left.suspect)), level)
-    # what imitates a cause that is seen cannot be ruled out either
-    seen = [one for one in (first, *others) if one.verdict in (NOT_DECIDABLE, ONE_READING)]
-    rivals = {name for one in seen for name in one.imitated_by}
-    return tuple(replace(one, verdict=NOT_DECIDABLE) if one.cause in rivals else one for one in (first, *others))
+    # a cause confounded with a visible one cannot be ruled out either
+    undecided = [cause for cause in (first, *others) if cause.verdict in (NOT_DECIDABLE, ONE_READING)]
+    rivals = {name for cause in undecided for name in cause.imitated_by}
+    return tuple(
+        replace(cause, verdict=NOT_DECIDABLE) if cause.cause in rivals else cause for cause in (first, *others)
+    )
 
 
 def diagnosis(answers):
-    """What the causes say together: causes, "none found", or "not decidable" with those that it could be."""
+    """The overall answer: causes, "none found", or "not decidable" with the possible causes."""
     if any(np.isnan(one.p) for one in answers):
         return NOT_DECIDABLE
     bad = [one.cause for one in answers if one.cause == BAD_READING and one.verdict == FOUND]
-    rest = [one for one in answers if one.verdict != NOT_FOUND and one.cause not in bad]
+    others = [one for one in answers if one.verdict != NOT_FOUND and one.cause not in bad]
     names = ", ".join(
-        one.cause + one.verdict.removeprefix(NOT_DECIDABLE) * (one.verdict == ONE_READING) for one in rest
+        one.cause + one.verdict.removeprefix(NOT_DECIDABLE) * (one.verdict == ONE_READING) for one in others
     )
-    certain = len(rest) == 1 and rest[0].verdict == FOUND
-    return "; ".join([*bad, *([names if certain else f"{NOT_DECIDABLE}: {names}"] if rest else [])]) or "none found"
+    certain = len(others) == 1 and others[0].verdict == FOUND
+    return "; ".join([*bad, *([names if certain else f"{NOT_DECIDABLE}: {names}"] if others else [])]) or "none found"
 
 
-def _verdict(p, imitators, limit, p_without_any=lambda: 0.0):
-    """Verdict on a cause from its p and the limit for it; p_without_any(): the largest with one reading left out."""
-    if np.isnan(p) or (p < limit and imitators):
+def _verdict(p, confounded, limit, p_without_any=lambda: 0.0):
+    """Verdict on a cause from its p and its limit; p_without_any(): the largest p with one reading left out."""
+    if np.isnan(p) or (p < limit and confounded):
         return NOT_DECIDABLE
     if p >= limit:
         return NOT_FOUND
@@ -142,24 +146,24 @@ def _verdict(p, imitators, limit, p_without_any=lambda: 0.0):
 def _bad_reading(tests, left, level):
     """The cause that one reading is wrong: the most suspicious one."""
     suspect = left.suspect
-    imitators = tests.imitators(BAD_READING, level.imitated_from, suspect or 0)
+    confounded = tests.confounded_causes(BAD_READING, level.imitated_from, suspect or 0)
     share = p = estimate = error = np.nan
     if suspect is not None:
         share = tests.explained_share(BAD_READING, suspect)
         p, estimate = left.p[suspect], left.difference_mm[suspect]
         error = estimate / left.ratio[suspect]
     limit = level.limit(tests, BAD_READING)
-    verdict = _verdict(p, imitators, limit)
-    return Cause(BAD_READING, 1, share, p, estimate, error, "mm", imitators, verdict, limit)
+    verdict = _verdict(p, confounded, limit)
+    return Cause(BAD_READING, 1, share, p, estimate, error, "mm", confounded, verdict, limit)
 
 
 def _acting_on_all(tests, level):
     """The causes that act on all readings, a list."""
     answers = []
     for name, (_, unit) in tests.columns.items():
-        p, imitators = float(tests.p(name)), tests.imitators(name, level.imitated_from)
+        p, confounded = float(tests.p(name)), tests.confounded_causes(name, level.imitated_from)
         limit = level.limit(tests, name)
-        verdict = _verdict(p, imitators, limit, lambda name=name: tests.p_without_any(name))
+        verdict = _verdict(p, confounded, limit, lambda name=name: tests.p_without_any(name))
         rank, share = tests.added[name].rank, tests.explained_share(name)
-        answers.append(Cause(name, rank, share, p, *tests.estimate(name), unit, imitators, verdict, limit))
+        answers.append(Cause(name, rank, share, p, *tests.estimate(name), unit, confounded, verdict, limit))
     return answers

@@ -25,7 +25,8 @@ _DENSE = 100
 class PrinterFit:
     """A printer, its calibration and the step at which the firmware's program stops (mm and degrees).
 
-    printer: its ways in the steps that its readings were counted in, step_factors (3,) as long as the file says.
+    printer: with carriage displacements in the steps of its readings, which are step_factors (3,) times those of the
+    file.
     """
 
     printer: Printer
@@ -45,7 +46,7 @@ class PrinterFit:
         return self.fit.at(self.fit.deviations, "without weights", unweighted).estimate
 
     def linearized(self, sd):
-        """The LinearizedModel of the same; sd (n,): standard deviations of the readings' noises, in proportion."""
+        """The LinearizedModel about the answer; sd (n,): relative standard deviations of the readings' noises."""
         return LinearizedModel.of(self.in_mm, WhiteNoise(sd[:, None]))
 
     @property
@@ -65,7 +66,7 @@ class PrinterFit:
 
     @cached_property
     def tolerance(self):
-        """How far (p,) the program's stop can lie from the best numbers, in mm and degrees; see `firmware`."""
+        """Largest possible stopping errors (p,) of the program, in mm and degrees; see `firmware`."""
         return stop(own_jacobian(self.residuals, self.fit.deviations), self.stopping_step)
 
     @property
@@ -75,12 +76,12 @@ class PrinterFit:
 
     @property
     def slack(self):
-        """How far (p,) saved numbers of these readings can lie from the best ones: the program's stop and rounding."""
+        """Largest possible errors (p,) of saved numbers of these readings: the program's stop and rounding."""
         return self.tolerance + rounding(self.printer)[: len(self.names)]
 
     @property
     def freedom(self):
-        """Readings less numbers."""
+        """Degrees of freedom: readings minus numbers."""
         return len(self.residuals) - len(self.fit.deviations)
 
     def reading_name(self, reading):
@@ -92,22 +93,22 @@ class PrinterFit:
     def standard_errors(self):
         """Standard errors (p,) of the numbers in mm and degrees.
 
-        # ASSUME the noises of a height and a distance stand to each other as the firmware's weights say.
+        # ASSUME the noises of a height and a distance have the ratio of the firmware's weights.
         """
         slope = own_numbers(self.residuals.mechanism, self.fit.deviations)[1]
         return np.sqrt(np.diag(slope @ self.fit.identifiability.covariance(self.fit.noise_mm) @ slope.T))
 
     @property
     def half_widths(self):
-        """Half the 95 % interval (p,) of the numbers, Student's t: 12.7 standard errors with a freedom of 1."""
+        """Half the 95 % interval (p,) of the numbers, Student's t: 12.7 standard errors with 1 degree of freedom."""
         return self.standard_errors * special.stdtrit(self.freedom, 0.5 + 0.5 * _CONFIDENCE)
 
 
 def fit_printer(printer, stopping_step, level):
-    """Calibrate a printer from its readings, in the steps that they were counted in.
+    """Calibrate a printer from its readings, in the steps of these readings.
 
-    level: of saying that these are not those of the file, see `steps`. Raises FitError naming the printer where that
-    fails or its numbers run away.
+    level: of the test whether these differ from those of the file, see `steps`. Raises FitError naming the printer
+    where the fit fails or its numbers reach a bound.
     """
     factors = steps.changed_steps(printer, level)
     printer = steps.with_steps(printer, factors)
@@ -115,28 +116,28 @@ def fit_printer(printer, stopping_step, level):
         fit = calibrate(residuals_of(printer))
         if fit.at_bound.any() or fit.identifiability.rank < len(fit.deviations):
             allowed = "readings over the whole bed, with the steps that the file states"
-            raise FitError(f"the readings do not hold its numbers; allowed: {allowed}", fit)
+            raise FitError(f"the readings do not determine its numbers; allowed: {allowed}", fit)
     except (FitError, ValueError, np.linalg.LinAlgError) as error:
-        told = "; ".join(filter(None, [str(error), steps.told(factors)]))
-        raise FitError(f"{printer.name}: {told}", getattr(error, "result", None)) from None
+        reasons = "; ".join(filter(None, [str(error), steps.describe(factors)]))
+        raise FitError(f"{printer.name}: {reasons}", getattr(error, "result", None)) from None
     return PrinterFit(printer, fit, stopping_step, factors)
 
 
 def common_arm_error(result):
-    """Standard error in mm of the arms' common length, beside the six other numbers, if heights alone had to give it.
+    """Standard error in mm of the arms' common length from heights alone, fitted together with the six other numbers.
 
-    Heights hardly see the scale: a robot with longer arms and a larger radius touches the same bed.
+    Heights are hardly sensitive to the scale: a robot with longer arms and a larger radius touches the same bed.
     """
     return _common_arm_error(result, -result.printer.height_drop_mm)
 
 
 def dense_arm_error(result):
-    """The same in mm for 100 heights with the noise of its own, spread evenly over their disc (a sunflower's seeds)."""
+    """The same in mm for 100 heights with the same noise, spread evenly over their disc (sunflower spiral)."""
     return _common_arm_error(result, result.residuals.mechanism.inverse(even_places(result, _DENSE)))
 
 
 def even_places(result, count):
-    """Places (count, 3) in mm on the disc of a printer's heights, as evenly as a sunflower's seeds."""
+    """Places (count, 3) in mm on the disc of a printer's heights, in a sunflower spiral."""
     mechanism, seeds = result.residuals.mechanism, np.arange(count)
     reach = np.linalg.norm(mechanism.forward(-result.printer.height_drop_mm)[:, :2], axis=1).max()
     radius, turn = reach * np.sqrt((seeds + 0.5) / count), seeds * np.pi * (3.0 - np.sqrt(5.0))
@@ -153,5 +154,5 @@ def _common_arm_error(result, actuators):
     heights = ProbedHeights(mechanism, actuators, np.zeros(len(actuators)), nothing, nothing[:, 0, 0])
     jacobian = heights.jacobian(deviations)
     both = np.concatenate([jacobian[..., :6], jacobian[..., 6:].sum(axis=-1, keepdims=True)], axis=-1)
-    seen = analyse_columns((*mechanism.parameters.names[:6], "dL"), parameter_scale(mechanism)[:7], both)
-    return float(seen.standard_errors(result.fit.noise_mm / np.sqrt(result.residuals.height_weight))[-1])
+    identifiability = analyse_columns((*mechanism.parameters.names[:6], "dL"), parameter_scale(mechanism)[:7], both)
+    return float(identifiability.standard_errors(result.fit.noise_mm / np.sqrt(result.residuals.height_weight))[-1])

@@ -14,7 +14,7 @@ from rrru.studies.printers.printer import Refused
 from rrru.studies.printers.printer_causes import Level
 from rrru.studies.printers.printer_fit import common_arm_error, dense_arm_error
 
-# below this freedom the standard errors are themselves hardly known
+# below these degrees of freedom the standard errors are themselves uncertain
 _LITTLE_FREEDOM = 3
 _NOT_FITTED = {"numbers": 0, "freedom": 0, "rank": 0, "largest_difference_in": "", "verdict": FAILED}
 _NOT_FITTED |= {"suspect": "", "cause": "not decidable", "effector_tilt": "", "notes": ""}
@@ -24,8 +24,8 @@ def tables(printers, settings):
     """Frames by table name: printers, printer_parameters, printer_readings, printer_causes.
 
     settings: `stopping_step`, `level` and `imitated_from` of the configuration's `printers` section. A printer that
-    cannot be read or fitted has a row in `printers` that says why, and none elsewhere. Printers that share readings are
-    one piece of evidence; for causes of the machines the level is divided by the pieces in which anything can be found.
+    cannot be read or fitted has only a row in `printers`, with the reason. Printers that share readings are one piece
+    of evidence. For causes of the machines the level is divided by the number of pieces that can show any cause.
     """
     rows = {name: [] for name in ("printers", "printer_parameters", "printer_readings", "printer_causes")}
     sound = [printer for printer in printers if not isinstance(printer, Refused)]
@@ -52,14 +52,14 @@ def tables(printers, settings):
 
 
 def level_of(printers, settings, groups=None):
-    """The Level for printers that are asked together."""
+    """The Level for printers that are tested together."""
     groups = _groups(printers) if groups is None else groups
     pieces = max(len({groups[printer.name] for printer in printers if _decides(printer)}), 1)
     return Level(settings["level"], settings["imitated_from"], pieces)
 
 
 def _printer_row(judged, twins):
-    """Row of `printers`, but for what identifies it."""
+    """Row of `printers` without its labels."""
     result, suspect, tilt = judged.result, judged.suspect, judged.tilt
     difference = np.abs(result.saved - result.fitted)
     worst, common, dense = int(difference.argmax()), common_arm_error(result), dense_arm_error(result)
@@ -91,14 +91,14 @@ def _printer_row(judged, twins):
 
 
 def _residuals(result):
-    """Readings less the fitted and less the saved printer's, in mm, each (n,)."""
+    """Residuals (n,) in mm of the fitted and of the saved printer, by name."""
     residuals = result.residuals
     answers = {"fitted": result.fit.deviations, "saved": residuals.mechanism.parameters.nominal}
     return {name: residuals.measured_mm - residuals.predicted_mm(answer) for name, answer in answers.items()}
 
 
 def _rms(result):
-    """Rms residuals of heights and distances under the fitted and the saved numbers in mm; absent ones are left out."""
+    """Rms residuals in mm of heights and distances for the fitted and the saved numbers; absent ones are left out."""
     values = {}
     for answer, residual in _residuals(result).items():
         for kind, part in zip(("height", "distance"), np.split(residual, [len(result.printer.height_mm)]), strict=True):
@@ -107,24 +107,24 @@ def _rms(result):
 
 
 def _notes(result, answers, common, dense):
-    """What a reader of the row should know."""
+    """Notes on the row."""
     if result.freedom < _LITTLE_FREEDOM:
         widths = (result.half_widths / result.standard_errors)[0]
-        wide = f"95 % intervals are {widths:.1f} standard errors wide to each side"
-        yield f"readings exceed numbers by {result.freedom} only: {wide}"
+        wide = f"95 % intervals are +- {widths:.1f} standard errors"
+        yield f"only {result.freedom} degrees of freedom: {wide}"
     if result.printer.parameter_set == "heights":
         alone = f"a standard error of {common:.1f} mm, 100 of them {dense:.2f} mm"
-        yield f"arms as saved: heights alone would give their common length with {alone}"
+        yield f"arms as saved, not fitted: heights alone would give their common length with {alone}"
     else:
         yield f"arms known to {result.half_widths[6:].max():.1f} mm (95 %)"
     if any(one.cause == "caliper_scale" and "caliper_offset" in one.imitated_by for one in answers):
         low, high = result.printer.distance_mm.min(), result.printer.distance_mm.max()
-        alike = f"all distances are {low:.1f} to {high:.1f} mm"
-        yield f"a scale error of the calipers cannot be told from an offset: {alike}"
+        span = f"all distances are {low:.1f} to {high:.1f} mm"
+        yield f"a scale error of the calipers is confounded with an offset: {span}"
 
 
 def _shared_readings(printers):
-    """Notes by printer on readings that an earlier printer of the file has too."""
+    """Notes by printer on readings shared with an earlier printer of the file."""
     seen, notes = {}, {}
     for printer in printers:
         sizes = {"heights": printer.height_drop_mm, "distances": printer.distance_drop_mm}
@@ -136,22 +136,24 @@ def _shared_readings(printers):
 
 
 def _groups(printers):
-    """Name by printer of the first one that it shares readings with, also by way of others."""
+    """Name by printer of the first one in its group of shared readings, directly or through others."""
     readings = ("height_drop_mm", "distance_drop_mm", "distance_mm")
-    sizes = [{getattr(one, name).tobytes() for name in readings if getattr(one, name).size} for one in printers]
-    shared = np.array([[not one.isdisjoint(other) for other in sizes] for one in sizes])
+    sizes = [
+        {getattr(printer, name).tobytes() for name in readings if getattr(printer, name).size} for printer in printers
+    ]
+    shared = np.array([[not first.isdisjoint(second) for second in sizes] for first in sizes])
     _, piece = csgraph.connected_components(shared, directed=False)
     _, first = np.unique(piece, return_index=True)
-    return {printer.name: printers[first[own]].name for printer, own in zip(printers, piece, strict=True)}
+    return {printer.name: printers[first[group]].name for printer, group in zip(printers, piece, strict=True)}
 
 
 def _decides(printer):
-    """Whether a printer's readings leave the freedom to tell anything."""
+    """Whether a printer's readings have enough degrees of freedom for a test."""
     return len(printer.height_mm) + len(printer.distance_mm) - len(printer.mechanism().parameters) > 1
 
 
 def _parameter_rows(judged):
-    """Rows of `printer_parameters`, all nine numbers; what was not calibrated is NaN but for what was saved."""
+    """Rows of `printer_parameters`, all nine parameters; those not calibrated are NaN except their saved values."""
     result, others = judged.result, judged.without_suspect
     saved = np.concatenate([result.saved, result.printer.arm_mm])[: len(NAMES)]
     calibrated = {
@@ -194,7 +196,7 @@ def _cause_rows(judged):
     result, imitated_from = judged.result, judged.level.imitated_from
     tests, rows = CauseTests(result), []
     for one in judged.causes:
-        hopeless = not _decides(result.printer) or tests.always_imitated(one.cause, imitated_from)
-        detectable = np.nan if hopeless else tests.detectable_mm(one.cause, one.limit)
+        undetectable = not _decides(result.printer) or tests.always_confounded(one.cause, imitated_from)
+        detectable = np.nan if undetectable else tests.detectable_mm(one.cause, one.limit)
         rows.append(asdict(one) | {"detectable_mm": detectable, "imitated_by": ", ".join(one.imitated_by)})
     return pd.DataFrame(rows).assign(printer=result.printer.name)

@@ -1,4 +1,4 @@
-"""Ingest of linear-delta printers: what their owners measured, and what their firmware made of it.
+"""Ingest of linear-delta printers: measurements of their owners, and saved answers of their firmware.
 
 The file is JSON, a list of printers:
 
@@ -11,15 +11,15 @@ The file is JSON, a list of printers:
      "heights": [{"z_mm": 17.4, "stable": [201936.8, 201995.2, 202106.2]}, ...],
      "distances": [{"mm": 65.1, "stable1": [...], "stable2": [...]}, ...]}
 
-`radius_mm`, `angle_deg`, `arm_mm` and `endstop_mm` are the answer that the firmware has saved, or for a printer that
-was never calibrated the nominal numbers: calibration starts there. `stable`: microsteps of the three carriages down
+`radius_mm`, `angle_deg`, `arm_mm` and `endstop_mm` are the saved answer of the firmware, or the nominal numbers of a
+printer without calibration. The calibration starts there. `stable`: microsteps of the three carriages down
 from their endstops. `z_mm`: the nozzle's true height there. `mm`: caliper distance between the nozzle's places at two
 such triples. One microstep is rotation_distance / (full_steps x microsteps), divided by gear ratios such as "3:1",
 unless step_mm gives it. `source`, `distances`, `gear_ratio` and `step_mm` may be absent; so may
 `program_height_rms_mm`, `program_distance_rms_mm` and `refit_max_difference`, which are not read.
 
-"probe_offset_mm": [x, y], of a printer or of one height: where the probe sits beside the nozzle; [0, 0] for a height
-that the nozzle touched by itself. "calibrated": false where the saved numbers are not said to come from the readings.
+"probe_offset_mm": [x, y], of a printer or of one height: offset of the probe from the nozzle; [0, 0] for a height that
+the nozzle itself touched. "calibrated": false where the saved numbers are not stated to come from the readings.
 """
 
 import json
@@ -39,15 +39,15 @@ _OPTIONAL = ("source", "distances", "probe_offset_mm", "calibrated")
 _NOT_READ = ("program_height_rms_mm", "program_distance_rms_mm", "refit_max_difference")
 _TEETH = r"\s*[1-9]\d*(\.\d+)?\s*:\s*[1-9]\d*(\.\d+)?\s*"
 _GEARS = re.compile(f"{_TEETH}(,{_TEETH})*")
+_MAX_NUMBER = 1e15  # a larger number is a typing error, and results from it may overflow
 # numbers of the calibration: radius, two angles, three endstops; with distances also three arms
-_MOST = 1e15  # a larger number is a slip, and what is reckoned from it may overflow
 _NUMBERS = {"heights": 6, "distances": 9}
 
 
 def read(path):
-    """Printers of a file, a tuple; one that is wrong is a `Refused` that names every field.
+    """Printers of a file, a tuple; an invalid one is a `Refused` that names every field.
 
-    Raises IngestError where the file holds no list of printers, or none that is sound.
+    Raises IngestError where the file has no list of printers, or no valid one.
     """
     problems = Problems(path)
     try:
@@ -62,7 +62,7 @@ def read(path):
         problems.refuse_now(value="something else", allowed="a list of at least one printer, each a mapping")
     names = [str(entry.get("id", f"number {k}")) for k, entry in enumerate(content, start=1)]
     for name in sorted({name for name in names if names.count(name) > 1}):
-        problems.add("id", column=name, value="an id that several printers have", allowed="an id per printer")
+        problems.add("id", column=name, value="an id of several printers", allowed="a different id for each printer")
     problems.refuse()
     printers = tuple(printer_of(path, name, entry) for name, entry in zip(names, content, strict=True))
     if all(isinstance(printer, Refused) for printer in printers):
@@ -71,7 +71,7 @@ def read(path):
 
 
 def printer_of(path, name, entry):
-    """The printer of an entry in the JSON's form, a Refused where something is wrong with it."""
+    """The printer of an entry in the JSON's form, a Refused for an invalid one."""
     problems = Problems(path)
     printer = _Reader(name, problems).printer(entry)
     try:
@@ -82,7 +82,7 @@ def printer_of(path, name, entry):
 
 
 class _Reader:
-    """Reads one printer and notes what is wrong with it under its name."""
+    """Reads one printer and notes its problems under its name."""
 
     def __init__(self, name, problems):
         self._name, self._problems, self._sound = name, problems, True
@@ -92,7 +92,7 @@ class _Reader:
         self._problems.add("printer", column=f"{self._name}: {field}", value=value, allowed=allowed)
 
     def printer(self, entry):
-        """The printer of an entry, None where something is wrong with it."""
+        """The printer of an entry, None for an invalid one."""
         self._keys("", entry, ("id", "radius_mm", "towers", "heights"), (*_OPTIONAL, *_NOT_READ))
         towers = self._of_kind(entry, "towers", dict)
         self._keys("towers", towers, _TOWERS)
@@ -123,13 +123,13 @@ class _Reader:
         return Printer(self._name, *saved, height, *ways, probe, entry.get("calibrated", True) is True)
 
     def _probe(self, entry):
-        """Offsets (n, 2) of the probe from the nozzle at the heights, NaN where nobody says."""
+        """Offsets (n, 2) of the probe from the nozzle at the heights, NaN where not stated."""
         everywhere = self._offset("probe_offset_mm", entry.get("probe_offset_mm"), [np.nan, np.nan])
-        heights = [one for one in self._of_kind(entry, "heights", list) if isinstance(one, dict)]
+        heights = [height for height in self._of_kind(entry, "heights", list) if isinstance(height, dict)]
         return np.array(
             [
-                self._offset(f"heights, number {number}, probe_offset_mm", one.get("probe_offset_mm"), everywhere)
-                for number, one in enumerate(heights, start=1)
+                self._offset(f"heights, number {number}, probe_offset_mm", height.get("probe_offset_mm"), everywhere)
+                for number, height in enumerate(heights, start=1)
             ]
         ).reshape(-1, 2)
 
@@ -143,15 +143,15 @@ class _Reader:
         return otherwise
 
     def _keys(self, place, mapping, needed, optional=()):
-        """Note keys that are missing and keys that nobody knows."""
+        """Note missing and unknown keys."""
         known = (*needed, *optional)
-        told = [(key, "nothing", "this field") for key in needed if key not in mapping]
-        told += [(key, "an unknown field", ", ".join(known)) for key in mapping if key not in known]
-        for key, value, allowed in told:
+        problems = [(key, "nothing", "this field") for key in needed if key not in mapping]
+        problems += [(key, "an unknown field", ", ".join(known)) for key in mapping if key not in known]
+        for key, value, allowed in problems:
             self._refuse(".".join(filter(None, (place, str(key)))), value, allowed)
 
     def _of_kind(self, mapping, key, kind, place=""):
-        """mapping[key] if it is of the kind, else an empty one."""
+        """mapping[key] if it is of the kind, otherwise an empty one."""
         value = mapping.get(key, kind())
         if isinstance(value, kind):
             return value
@@ -159,11 +159,11 @@ class _Reader:
         return kind()
 
     def _number(self, field, value, positive=False):
-        """A number as float, NaN where it is none; that there is nothing is noted elsewhere."""
+        """A number as float, NaN for anything else; missing values are noted elsewhere."""
         if value is None:
             return np.nan
         number = isinstance(value, int | float) and not isinstance(value, bool)
-        if number and abs(value) <= _MOST and (value > 0.0 or not positive):
+        if number and abs(value) <= _MAX_NUMBER and (value > 0.0 or not positive):
             return float(value)
         self._refuse(field, repr(value), "a positive number" if positive else "a finite number")
         return np.nan
@@ -205,7 +205,7 @@ class _Reader:
         return [np.nan] * 3
 
     def _counts(self, heights, distances):
-        """Note too few readings: one more than numbers to fit, else nothing tells how good they are."""
+        """Note too few readings: at least one degree of freedom is needed for the noise."""
         few, least = _NUMBERS["heights"], _NUMBERS["distances" if distances else "heights"]
         if heights + distances <= least or heights < few:
             allowed = f"at least {few} heights and {least + 1} readings for {least} numbers"

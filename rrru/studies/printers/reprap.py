@@ -1,13 +1,13 @@
-"""What RepRapFirmware is told and says, as the printers' JSON form: M665 and M666, a list of G30, the heights.
+"""Commands and answers of RepRapFirmware as the printers' JSON form: M665 and M666, a list of G30, the heights.
 
     M665 L288.140 R136.2 H201.1 X0.1 Y-0.2 Z0      rods (one, or three with colons), radius, homed height, angles
     M666 X-1.36 Y1.11 Z0.25                        endstops, added to the homed height
-    G31 X0 Y20 Z1.2                                where the probe sits beside the nozzle, its trigger height
-    G30 P0 X0 Y125 Z-99999                         places, in order of P; the list may be in a file of its own
+    G31 X0 Y20 Z1.2                                offset of the probe from the nozzle, its trigger height
+    G30 P0 X0 Y125 Z-99999                         places, in order of P; the list may be in a separate file
     G32 bed probe heights: 0.018 0.014 ..          the answer of G30 with S-1
 
-All in one file, one below the other; of a letter that stands twice the last one counts. Towers X, Y and Z stand at 210,
-330 and 90 degrees. The numbers were in force while probing and come from other readings.
+All are in one file; of a repeated letter the last one counts. Towers X, Y and Z are at 210, 330 and 90 degrees. The
+numbers were active during probing and come from other readings.
 """
 
 import re
@@ -34,19 +34,19 @@ def belongs(path):
 
 
 def entry(path, name):
-    """The printer of a file as an entry of the JSON form; raises IngestError with what is missing in it."""
+    """The printer of a file as an entry of the JSON form; raises IngestError with what is missing."""
     text = Path(path).read_text(encoding="utf-8", errors="replace")
     commands = _commands(text)
     found = _HEIGHTS.findall(text)
-    heights = [float(one) for one in re.findall(_NUMBER, found[-1])] if found else []
-    places = [[one["X"][0], one["Y"][0]] for _, one in sorted(commands["G30"].items())]
+    heights = [float(number) for number in re.findall(_NUMBER, found[-1])] if found else []
+    places = [[letters["X"][0], letters["Y"][0]] for _, letters in sorted(commands["G30"].items())]
     if len(heights) != len(places) or not heights:
         _refuse(
             path, "G30", f"{len(heights)} heights of {len(places)} places", "a height for every place, as G30 S-1 lists"
         )
     x, y, trigger = (commands["G31"].get(axis, [0.0])[0] for axis in "XYZ")
     towers, radius = _towers(path, commands["M665"], commands["M666"])
-    # the probe is sent to the place, the nozzle stands beside it
+    # the command is for the probe; the nozzle is at its offset from it
     nozzle = np.column_stack([np.array(places) - [x, y], np.array(heights) + trigger])
     drops = -_robot(path, radius, towers).inverse(nozzle)
     readings = [{"z_mm": trigger, "stable": drop.tolist()} for drop in drops]
@@ -68,8 +68,10 @@ def _towers(path, sizes, endstops):
 
 
 def _robot(path, radius, towers):
-    """The machine that the firmware took it for."""
-    angles, arms, endstops = ([one[size] for one in towers.values()] for size in ("angle_deg", "arm_mm", "endstop_mm"))
+    """The machine in the firmware's model."""
+    angles, arms, endstops = (
+        [tower[size] for tower in towers.values()] for size in ("angle_deg", "arm_mm", "endstop_mm")
+    )
     try:
         return linear_delta(radius, np.radians(angles), arms, endstops, "heights")
     except ConfigError:

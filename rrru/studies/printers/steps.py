@@ -1,10 +1,9 @@
-"""Wrong microsteps: a file whose readings were counted in steps of another length than it states now.
+"""Wrong microsteps: the readings of a file have steps of another length than the file now states.
 
-Under the right steps the saved numbers leave of the readings what noise and small changes leave, under others
-centimetres. The noise is unknown, so that the likelihood of one length against another is (rms_1 / rms_2) ^ readings. A
-zero of the heights that is off (a Z offset that was applied since) counts as one reading that is off, not as all of
-them. Steps count as changed where the likelihood exceeds the number of changes that are tried over the level
-(Bonferroni).
+With the correct steps the residuals of the saved numbers are those of noise and small changes, with others they are
+centimetres. The noise is unknown, so that the likelihood ratio of two lengths is (rms_1 / rms_2) ^ readings. A zero
+offset of the heights (a Z offset that was applied since) counts as the error of one reading, not of all. Steps count as
+changed where the likelihood ratio exceeds the number of tested changes over the level (Bonferroni).
 """
 
 from dataclasses import replace
@@ -20,13 +19,13 @@ _CHANGES = np.array(
 
 
 def with_steps(printer, factors):
-    """The printer with its carriages' ways in steps that are factors (3,) times as long."""
+    """The printer with carriage displacements in steps that are factors (3,) times as long."""
     ways = printer.height_drop_mm * factors, printer.distance_drop_mm * factors
     return replace(printer, height_drop_mm=ways[0], distance_drop_mm=ways[1], step_mm=printer.step_mm * factors)
 
 
 def changed_steps(printer, level):
-    """Factors (3,) of the steps' lengths under which the readings belong to the saved numbers, ones as a rule."""
+    """Factors (3,) of the step lengths with which the readings belong to the saved numbers; ones where unchanged."""
     stated = _left(printer)
     left = [_left(with_steps(printer, factors)) for factors in _CHANGES]
     best, readings = int(np.argmin(left)), len(printer.height_mm) + len(printer.distance_mm)
@@ -34,20 +33,20 @@ def changed_steps(printer, level):
     return _CHANGES[best] if stated > needed * left[best] else np.ones(3)
 
 
-def told(factors):
-    """What to say of factors (3,) of the steps' lengths; empty for ones."""
+def describe(factors):
+    """The sentence on factors (3,) of the step lengths; empty for ones."""
     changed = np.flatnonzero(factors != 1.0)
     if not changed.size:
         return ""
     where = "" if len(changed) == 3 else f" on tower {'abc'[changed[0]]}"
-    longer = f"the readings belong to steps {factors[changed[0]]:g} times as long as the file says{where}"
-    return f"{longer}: microsteps or rotation distance were changed after the calibration"
+    sentence = f"the readings belong to steps {factors[changed[0]]:g} times as long as the file says{where}"
+    return f"{sentence}: microsteps or rotation distance were changed after the calibration"
 
 
 def _left(printer):
-    """Rms in mm of what the saved numbers leave of the readings, the heights' mean counted once.
+    """Residual rms in mm of the saved numbers, the mean of the heights counted once.
 
-    A place out of reach is off by an arm's length.
+    A place out of reach has an error of an arm's length.
     """
     robot = printer.mechanism()
     heights = printer.height_mm - robot.forward(-printer.height_drop_mm)[:, 2]

@@ -1,6 +1,6 @@
 """Paper B's claims and contradictions, recomputed, and what its scan has lost.
 
-Its dimensions are lost too: Ptt3's nominal ones stand in.
+Its dimensions are lost too: Ptt3's nominal ones are used instead.
 """
 
 import numpy as np
@@ -74,7 +74,7 @@ def _constraint_measures():
     lambda _, apart: apart < -200.0,
 )
 def _upright_sliders():
-    """Slider position at which the links stand upright, with R = r and with R - r = 240 mm."""
+    """Slider position at which the links are upright, with R = r and with R - r = 240 mm."""
     return tuple(robot.inverse(_UPRIGHT)[0, 0] for robot in _ROBOTS)
 
 

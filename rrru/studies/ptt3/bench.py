@@ -40,7 +40,7 @@ def kinematics(settings):
 
 
 def _factors(mechanism, position):
-    """The determinant by its factors, and these, as columns; null where the rails are inclined."""
+    """The determinant from its factors, and the factors, as columns; null where the rails are inclined."""
     names = ("factored_determinant", "height_factor_mm", "kappa_mm2", "least_d_mm")
     if mechanism.rail_inclination_rad:
         return dict.fromkeys(names, np.full(len(position), np.nan))
@@ -85,7 +85,7 @@ def backlash(settings):
     truth = section["robot"]["effects"].get("backlash", {})
     place = (0.0, 0.0, float(np.mean(section["curve"]["z_mm"])))
     records, widths = [], []
-    for load in sorted({own["payload_kg"] for own in section["experiments"].values()}):
+    for load in sorted({entry["payload_kg"] for entry in section["experiments"].values()}):
         for leg in _LEGS:
             record = encoder_record(robot, leg, load, bench, place, stream(seed, "ptt", "bench", load, leg))
             width = measured_width(record, bench.lead_mm)
@@ -108,18 +108,19 @@ def repeatabilities(settings, backlash):
     sliders' positions E_k come from the tracker's F_k through the nominal inverse kinematics.
     """
     section = settings["ptt"]
-    name, own = next(iter(section["experiments"].items()))
+    name, entry = next(iter(section["experiments"].items()))
     frames = []
     for compensate in (False, True):
-        one = experiment(settings, name, widths_mm(backlash, own["payload_kg"]), compensate)
-        directions = [k % 2 == 1 for k in range(one.repeats)]
-        measured, _ = replace(one.campaign, plan=one.plan(reverse=directions)).run(label="repeatability")
-        position = rows.measured(measured).reshape(one.repeats, -1, 3)
+        bench_experiment = experiment(settings, name, widths_mm(backlash, entry["payload_kg"]), compensate)
+        directions = [k % 2 == 1 for k in range(bench_experiment.repeats)]
+        plan = bench_experiment.plan(reverse=directions)
+        measured, _ = replace(bench_experiment.campaign, plan=plan).run(label="repeatability")
+        position = rows.measured(measured).reshape(bench_experiment.repeats, -1, 3)
         position[1::2] = position[1::2, ::-1]
-        values = one.model.inverse(position.reshape(-1, 3)).reshape(position.shape)
+        values = bench_experiment.model.inverse(position.reshape(-1, 3)).reshape(position.shape)
         scatter, travel = repeatability(values)
         noise = section["noise_mm"] * np.sqrt(
-            (one.model.jacobian(position[0], values[0]) ** 2).sum(axis=2).mean(axis=0)
+            (bench_experiment.model.jacobian(position[0], values[0]) ** 2).sum(axis=2).mean(axis=0)
         )
         columns = {
             "leg": _LEGS,

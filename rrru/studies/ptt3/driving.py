@@ -1,7 +1,7 @@
-"""The robot driven again with what was learned: on the curve, with everything random drawn anew, and elsewhere. mm.
+"""The robot driven again with learned corrections: on the curve, with new random draws, and on other tasks. mm.
 
-# ASSUME passes in one direction differ by the tracker's noise alone: the run-up takes up the play, and no effect
-drifts. So one pass is driven # and gets the noise of a mean over the configured repeats.
+# ASSUME passes in one direction differ by the tracker's noise alone: the run-up crosses the backlash, and no effect
+drifts. So one pass is driven and gets the noise of a mean over the configured repeats.
 """
 
 from dataclasses import dataclass, replace
@@ -15,7 +15,7 @@ from rrru.studies.ptt3.experiments import Experiment
 from rrru.studies.ptt3.learning import learning
 from rrru.studies.ptt3.results import benefits, mean_errors
 
-# those that the study rests on; all eight would take three times as long
+# the methods of the study's conclusions; all eight would take three times as long
 REDRAWN = ("rbf_inverse", "rbf_jacobian", "rbf_absolute", "parameters")
 EXTRAPOLATED = ("rbf_inverse", "rbf_paper_mm", "parameters", "rbf_after_parameters")
 _LEVELS = {"benefit_low_percent": 0.05, "benefit_high_percent": 0.95}
@@ -27,7 +27,7 @@ class Pass:
     """One pass of an experiment's curve, prepared for any number of controllers.
 
     path_mm (N, 3): positions in the order driven, rows `index` those of the points target_mm; nominal_mm (N, 3): the
-    sliders there; motion: what the effects know of it.
+    sliders there; motion: input of the effects.
     """
 
     experiment: Experiment
@@ -46,8 +46,8 @@ class Pass:
         """Errors (n, 3) of the curve's points, without noise, of sliders (N, 3), by default the nominal ones."""
         campaign = self.experiment.campaign
         wanted = self.nominal_mm if sliders_mm is None else sliders_mm
-        sent = wanted if campaign.drive is None else campaign.drive(wanted)
-        motion = replace(self.motion, path_drive=sent, drive=sent[self.index])
+        commanded = wanted if campaign.drive is None else campaign.drive(wanted)
+        motion = replace(self.motion, path_drive=commanded, drive=commanded[self.index])
         position, _ = campaign.robot.positions(motion)
         return self.experiment.curve.without_run_up(position - self.target_mm)
 
@@ -64,14 +64,15 @@ def one_pass(experiment, payload_kg=None, reverse=False):
 def driven(drive, learned, methods, labels=()):
     """Errors (n, 3) of the point means on a pass by method.
 
-    Every method gets the same noise, from the experiment's stream of that label, so that differences are the methods'.
+    Every method gets the same noise, from the experiment's stream of that label, so that differences come from the
+    methods alone.
     """
     noise = drive.experiment.mean_noise("closed_loop", *labels)
     return {name: drive.errors(learned.sliders(name, drive.path_mm)) + noise for name in methods}
 
 
 def redrawn(drive, methods, labels):
-    """`results.benefits` of some methods, everything random drawn from the experiment's streams of those labels.
+    """`results.benefits` of some methods, with random draws from the experiment's streams of those labels.
 
     That is the noise before and after, the training points, and the folds.
     """
@@ -82,7 +83,7 @@ def redrawn(drive, methods, labels):
 
 
 def with_ranges(experiment, benefit, redraws):
-    """Rows of `ptt_benefit`, but for the experiment: benefits with their range over redraws, null if not redrawn."""
+    """Rows of `ptt_benefit` without the experiment: benefits with their range over redraws, null if not redrawn."""
     drive = one_pass(experiment)
     frames = [redrawn(drive, REDRAWN, ("redraw", draw)) for draw in range(redraws)]
     groups = pd.concat(frames).groupby(_KEYS)["benefit_percent"]
@@ -91,7 +92,7 @@ def with_ranges(experiment, benefit, redraws):
 
 
 def starts(experiment, starts_deg):
-    """Rows of `ptt_start`, but for the experiment: the paper's way with the curve begun elsewhere, one draw each."""
+    """Rows of `ptt_start` without the experiment: the paper's method with other start azimuths, one draw each."""
     frames = []
     for start in starts_deg:
         other = replace(experiment, curve=replace(experiment.curve, start_deg=start))
@@ -115,7 +116,7 @@ def changes(experiment, radius_mm, height_mm, payload_kg):
 
 
 def extrapolations(experiment, learned, tasks):
-    """Rows of `ptt_extrapolation`, but for the experiment: benefits on every changed task, all points together.
+    """Rows of `ptt_extrapolation` without the experiment: benefits on every changed task, all points together.
 
     tasks: sizes by family, see `changes`; one that leaves the workspace is absent.
     """

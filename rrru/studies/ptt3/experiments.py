@@ -1,7 +1,7 @@
-"""The experiments of paper B as campaigns like any other: a 3-PTT drives one curve several times. mm, angles in rad.
+"""The experiments of paper B as ordinary campaigns: a 3-PTT drives one curve several times. mm, angles in rad.
 
-A point's position is the mean of what the tracker sees. Slider columns of the measurements hold where the controller
-wants the sliders; the jump that a compensated backlash adds to the motor's command is not in them.
+The position of a point is the mean of the tracker's readings. Slider columns of the measurements are the controller's
+desired positions, without the jump that backlash compensation adds to the motor's command.
 """
 
 from dataclasses import dataclass, replace
@@ -52,7 +52,7 @@ class Curve:
 
 @dataclass(frozen=True)
 class Lesson:
-    """What a network learns from and may be: its keys in the configuration's `ptt.network`."""
+    """Training data and hyperparameters of a network: its keys in the configuration's `ptt.network`."""
 
     train: int
     neurons: int
@@ -63,10 +63,10 @@ class Lesson:
 
 @dataclass(frozen=True)
 class Experiment:
-    """One experiment: its campaign, its curve and motion, and what is learned from it how.
+    """One experiment: its campaign, curve and motion, and the settings for learning from it.
 
-    model: the mechanism with the calibrated parameters; repeats: passes that a measured position is the mean of;
-    network: None where nothing is learned; paper_spread: the paper's, its unit not printed.
+    model: the mechanism with the calibrated parameters; repeats: number of passes that a measured position averages;
+    network: None without learning; paper_spread: the paper's, unit not printed.
     """
 
     campaign: setup.VirtualCampaign
@@ -91,18 +91,18 @@ class Experiment:
 
 
 def nominal(settings):
-    """The robot as the builder wants it, see `rrru.studies.config`."""
+    """The robot section for the builder, see `rrru.studies.config`."""
     return {"name": "ptt3", "dimensions": settings["robots"]["ptt3"]}
 
 
 def experiment(settings, name, widths_mm=(0.0, 0.0, 0.0), compensate=None):
-    """The experiment of that name, of the parts seed, robots.ptt3, loads and ptt of the configuration.
+    """The experiment of that name from the parts seed, robots.ptt3, loads and ptt of the configuration.
 
-    widths_mm (3,): the backlash as measured; compensate: whether the command jumps by it at a reversal, instead of as
+    widths_mm (3,): measured backlash; compensate: whether the command jumps by it at a reversal, by default as
     configured. Raises ConfigError for an unknown error or effect of the robot.
     """
     section = settings["ptt"]
-    own, curve = section["experiments"][name], Curve(**section["curve"])
+    entry, curve = section["experiments"][name], Curve(**section["curve"])
     campaign = campaign_section(settings, name)
     virtual = {
         "name": name,
@@ -114,17 +114,17 @@ def experiment(settings, name, widths_mm=(0.0, 0.0, 0.0), compensate=None):
         **{key: campaign[key] for key in ("passes", "noise_mm")},
     }
     driven = setup.virtual_campaign(nominal(settings), virtual)
-    if own["compensate_backlash"] if compensate is None else compensate:
+    if entry["compensate_backlash"] if compensate is None else compensate:
         driven = replace(driven, drive=partial(compensated, widths_mm=widths_mm))
     return Experiment(
         campaign=driven,
         curve=curve,
         motion=section["motion"],
         repeats=section["repeats"],
-        payload_kg=own["payload_kg"],
+        payload_kg=entry["payload_kg"],
         model=setup.mechanism(nominal(settings), section["parameters"]),
         network=Lesson(**section["network"]) if "network" in section else None,
-        paper_spread=own["paper_spread"],
+        paper_spread=entry["paper_spread"],
     )
 
 
@@ -139,7 +139,7 @@ def point_means(experiment, measurements):
 
 
 def joined(measured, dwell_s):
-    """Measurements of several experiments as one campaign, one after another with a rest between, runs numbered on."""
+    """Measurements of several experiments as one campaign, in sequence with pauses, runs numbered continuously."""
     parts, runs, time = [], 0, 0.0
     for frame in measured:
         parts.append(frame.assign(run=frame["run"] + runs, time_s=frame["time_s"] + time))

@@ -1,7 +1,7 @@
-"""What can be learned from a measured curve, each as a controller: positions (n, 3) to slider positions (n, 3) in mm.
+"""Models learned from a measured curve, each as a controller: positions (n, 3) to slider positions (n, 3) in mm.
 
-Where the paper is followed, a height error counts from that of the curve's first point (3.3), so that a common height
-error stays. The networks with `absolute` heights and the calibrated model take it out as well.
+As in the paper, a height error is relative to that of the curve's first point (3.3), so that a common height error
+remains. The networks with `absolute` heights and the calibrated model correct it as well.
 """
 
 from dataclasses import dataclass
@@ -18,12 +18,12 @@ from rrru.studies.ptt3.experiments import Lesson
 
 
 def relative(error_mm):
-    """Position errors (n, 3) with the height's counted from that of the first point."""
+    """Position errors (n, 3) with heights relative to the first point."""
     return error_mm - np.array([0.0, 0.0, error_mm[0, 2]])
 
 
-def remembered(function):
-    """The function of an array with its answer kept until it is asked about another array."""
+def cached_last(function):
+    """The function of an array with a cache of its last answer."""
     last = [None, None]
 
     def answer(array):
@@ -36,9 +36,9 @@ def remembered(function):
 
 @dataclass(frozen=True)
 class Learning:
-    """One experiment's curve as measured, and what is learned from its training points.
+    """One experiment's measured curve, and the models learned from its training points.
 
-    command_mm, sliders_mm, measured_mm: (n, 3); train (n,): which points are learned from; folds: fold of every
+    command_mm, sliders_mm, measured_mm: (n, 3); train (n,): flags of the training points; folds: fold of every
     training point; paper_spread: the paper's, unit not printed.
     """
 
@@ -53,19 +53,19 @@ class Learning:
 
     @property
     def error_mm(self):
-        """Measured less commanded positions (n, 3)."""
+        """Measured minus commanded positions (n, 3)."""
         return self.measured_mm - self.command_mm
 
     @property
     def paper_spreads_mm(self):
-        """The paper's spread by both readings of its unit: of inputs scaled to -1 .. 1, or mm."""
+        """The paper's spread with both interpretations of its unit: of inputs scaled to -1 .. 1, or mm."""
         half_range_mm = 0.5 * float(np.ptp(self.command_mm, axis=0).max())
         return {"paper_scaled": self.paper_spread * half_range_mm, "paper_mm": self.paper_spread}
 
     def choose(self, targets):
         """The candidate spread and the number of neurons with the least cross-validated error on targets (n, q)."""
-        points, wanted, own = self.command_mm[self.train], targets[self.train], self.network
-        return choose(points, wanted, own.spreads_mm, own.neurons, self.folds, own.new_share)
+        points, wanted, network = self.command_mm[self.train], targets[self.train], self.network
+        return choose(points, wanted, network.spreads_mm, network.neurons, self.folds, network.new_share)
 
     def trained(self, targets, spread_mm, neurons, new_share=None):
         """Network on the training points with targets (n, q); new_share: another than the configured one."""
@@ -80,8 +80,8 @@ class Learning:
 
     @cached_property
     def chosen(self):
-        """The network of that choice; several methods ask it about the same path."""
-        return remembered(self.trained(relative(self.error_mm), self.choice.spread_mm, self.choice.neurons))
+        """The network of that choice, cached because several methods evaluate it on the same path."""
+        return cached_last(self.trained(relative(self.error_mm), self.choice.spread_mm, self.choice.neurons))
 
     @cached_property
     def calibration(self):
@@ -90,15 +90,15 @@ class Learning:
         return calibrate(TargetPositions(self.mechanism, *points))
 
     @cached_property
-    def rest(self):
-        """The network of a choice of its own, on what the calibration leaves."""
+    def residual_network(self):
+        """The network on the residuals of the calibration, with its own choice of spread and neurons."""
         left = self.measured_mm - self.mechanism.forward(self.sliders_mm, self.calibration.deviations)
         choice = self.choose(left)
         return self.trained(left, choice.spread_mm, choice.neurons)
 
     @cached_property
     def paper(self):
-        """Networks of the paper's spread by both readings, with all neurons that its target of zero error asks for."""
+        """Networks of the paper's spread with both interpretations, with all neurons for its target of zero error."""
         error, count = relative(self.error_mm), int(self.train.sum())
         return {key: self.trained(error, spread, count, ROUNDING) for key, spread in self.paper_spreads_mm.items()}
 
@@ -108,7 +108,7 @@ class Learning:
         return RBFInterpolator(self.command_mm[self.train], relative(self.error_mm)[self.train], kernel="linear")
 
     def _absolute(self, path):
-        """The chosen network's answers with the common height error added."""
+        """The chosen network's output with the common height error added."""
         return self.chosen(path) + self.error_mm[0] * np.array([0.0, 0.0, 1.0])
 
     def sliders(self, method, path):
@@ -117,13 +117,13 @@ class Learning:
 
 
 def _network(answers):
-    """The method that takes a network's answers out through the exact inverse kinematics, eq. (11)."""
+    """The method that corrects by a network's output through the exact inverse kinematics, eq. (11)."""
     return lambda learned, path: through_inverse(learned.mechanism, path, answers(learned, path))
 
 
 # The cross-validated network through eq. (11) or eq. (12), and with the common height error learned; the paper's
-# spread, scaled or in mm; scipy's biharmonic spline, which has nothing to choose; the calibrated model, and a network
-# on what it leaves.
+# spread, scaled or in mm; scipy's biharmonic spline without free choices; the calibrated model, and a network
+# on its residuals.
 METHODS = {
     "rbf_inverse": _network(lambda learned, path: learned.chosen(path)),
     "rbf_jacobian": lambda learned, path: through_jacobian(learned.mechanism, path, learned.chosen(path)),
@@ -133,15 +133,15 @@ METHODS = {
     "interpolator": _network(lambda learned, path: learned.spline(path)),
     "parameters": lambda learned, path: learned.mechanism.inverse(path, learned.calibration.deviations),
     "rbf_after_parameters": lambda learned, path: through_inverse(
-        learned.mechanism, path, learned.rest(path), learned.calibration.deviations
+        learned.mechanism, path, learned.residual_network(path), learned.calibration.deviations
     ),
 }
 
 
 def learning(experiment, means, labels=()):
-    """What an experiment's point means (see `experiments.point_means`) allow to learn.
+    """The Learning of an experiment's point means (see `experiments.point_means`).
 
-    Which points train, and their folds, are drawn from the experiment's streams of those labels.
+    Training points and their folds are drawn from the experiment's streams of those labels.
     """
     network, generator = experiment.network, experiment.campaign.generator
     train = np.zeros(len(means[0]), dtype=bool)

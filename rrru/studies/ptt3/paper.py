@@ -1,7 +1,7 @@
 """Every number that paper B still prints: Chen, Huang, Wei, Zheng, Chen, Trans. Chinese Society for Agricultural
 Machinery 54 (2), 2023.
 
-The scan has lost its tables and the bodies of its displayed equations; what that takes away is in the audit.
+The scan has lost its tables and the bodies of its displayed equations; what is lost is in the audit.
 """
 
 from rrru.studies.paper import Number, numbers

@@ -1,10 +1,10 @@
-"""Paper B's part of the configuration: whether it fits together, and its experiments as campaigns. Light to import."""
+"""Paper B's part of the configuration: its consistency check, and its experiments as campaigns. Light to import."""
 
 from rrru.errors import ConfigError
 
 
 def check(config):
-    """Raise ConfigError where the `ptt` section does not fit together, before anything runs."""
+    """Raise ConfigError where the `ptt` section is inconsistent, before anything runs."""
     section = config["ptt"]
     known, joint = section["experiments"], section["joint"]
     for name, members in joint.items():
@@ -24,15 +24,15 @@ def check(config):
 
 
 def check_robot(config):
-    """Raise ConfigError where the experiments' robot has a deviation or an effect that does not exist."""
-    # not at the top: it imports all that a robot needs
+    """Raise ConfigError where the experiments' robot has an unknown deviation or effect."""
+    # imported here because it imports all modules of a robot
     from rrru.studies.ptt3.experiments import experiment
 
     experiment(config, next(iter(config["ptt"]["experiments"])))
 
 
 def campaign_section(settings, name):
-    """What an entry of `campaigns` would say of an experiment, or of experiments that are diagnosed together."""
+    """The entry of `campaigns` for an experiment, or for experiments that are diagnosed together."""
     section = settings["ptt"]
     loads = [section["experiments"][member]["payload_kg"] for member in section.get("joint", {}).get(name, [name])]
     return {

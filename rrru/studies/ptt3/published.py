@@ -1,4 +1,4 @@
-"""Paper B's numbers beside this study's, from the configuration and the tables of the 3-PTT."""
+"""Paper B's numbers compared with this study's, from the configuration and the tables of the 3-PTT."""
 
 import numpy as np
 import pandas as pd
@@ -6,7 +6,7 @@ import pandas as pd
 from rrru.studies import paper
 from rrru.studies.ptt3.paper import NUMBERS
 
-# a network has converged where its cross-validated error is within this share of the least
+# relative excess of the cross-validated error over its minimum at which a network has converged
 _CONVERGED = 0.1
 
 
@@ -14,17 +14,19 @@ def published_rows(section, benefit, spread, training, repeatability):
     """Rows of `published` for paper B.
 
     section: the configuration's `ptt`; benefit, spread, training, repeatability: the tables ptt_benefit, ptt_spread,
-    ptt_training and ptt_repeatability. Benefits are those of the Jacobian's route on points that were not learned.
+    ptt_training and ptt_repeatability. Benefits are those of the correction through the Jacobian on test points.
     """
     order = {name: number for number, name in enumerate(section["experiments"], start=1)}
-    papers_way = (benefit["method"] == "rbf_jacobian") & (benefit["set"] == "test") & benefit["axis"].isin(list("xyz"))
+    paper_method = (
+        (benefit["method"] == "rbf_jacobian") & (benefit["set"] == "test") & benefit["axis"].isin(list("xyz"))
+    )
     by_leg = repeatability.pivot(index="leg", columns="compensated", values="per_travel_um_per_mm")
     here = {
         **_design(section),
         **_networks(section["curve"], spread[spread["chosen"]], training, order),
         **{
             f"benefit_{order[row.experiment]}_{row.axis}": row.benefit_percent
-            for row in benefit[papers_way].itertuples()
+            for row in benefit[paper_method].itertuples()
         },
         "order_repeatability": float((by_leg[True] < by_leg[False]).all()),
     }
@@ -32,7 +34,7 @@ def published_rows(section, benefit, spread, training, repeatability):
 
 
 def _design(section):
-    """What is configured of the experiments."""
+    """The configured numbers of the experiments."""
     loads = {entry["payload_kg"] for entry in section["experiments"].values() if entry["payload_kg"] > 0.0}
     points, train = section["curve"]["points"], section["network"]["train"]
     return {
@@ -63,5 +65,5 @@ def _networks(curve, chosen, training, order):
 
 
 def _steps(neurons, error):
-    """Fewest neurons (n,) with an error (n,) within a share of the least."""
+    """Fewest neurons (n,) with an error (n,) near the minimum."""
     return neurons[np.argmax(error <= (1.0 + _CONVERGED) * error.min())]

@@ -12,7 +12,7 @@ AXES = ("x", "y", "z", "z_mean", "z_absolute")
 
 
 def along_axes(error_mm):
-    """Errors (n, 5) along AXES from errors (n, 3): the height's less the first point's, less their mean, as it is."""
+    """Errors (n, 5) along AXES from errors (n, 3): heights minus the first one, minus their mean, unchanged."""
     height = error_mm[:, 2]
     return np.column_stack([relative(error_mm), height - height.mean(), height])
 
@@ -39,12 +39,12 @@ def mean_errors(before_mm, after_mm, sets):
 
 
 def benefits(learned, after_mm):
-    """Rows of `ptt_benefit`, but for the experiment and the ranges; after_mm: errors (n, 3) by method."""
+    """Rows of `ptt_benefit` without the experiment and the ranges; after_mm: errors (n, 3) by method."""
     return mean_errors(learned.error_mm, after_mm, {"train": learned.train, "test": ~learned.train})
 
 
 def points(learned, after_mm):
-    """Rows of `ptt_points`, but for the experiment; after_mm (n, 3): driven again with the chosen network."""
+    """Rows of `ptt_points` without the experiment; after_mm (n, 3): driven again with the chosen network."""
     error = relative(learned.error_mm)
     vectors = {
         "command": learned.command_mm,
@@ -64,7 +64,7 @@ def points(learned, after_mm):
 
 
 def corrections(learned):
-    """Rows of `ptt_corrections`, but for the experiment: what eq. (11) and eq. (12) move every slider by."""
+    """Rows of `ptt_corrections` without the experiment: corrections of every slider by eq. (11) and eq. (12)."""
     command, mechanism = learned.command_mm, learned.mechanism
     nominal, error = mechanism.inverse(command), learned.chosen(command)
     exact = through_inverse(mechanism, command, error) - nominal
@@ -80,7 +80,7 @@ def corrections(learned):
 
 
 def spreads(learned, training):
-    """Rows of `ptt_spread`, but for the experiment: every spread of `trainings` with its best number of neurons."""
+    """Rows of `ptt_spread` without the experiment: every spread of `trainings` with its best number of neurons."""
     keys = ["spread_from", "learns", "spread_mm"]
     best = training.loc[training.groupby(keys, sort=False)["validation_mse_mm2"].idxmin()].reset_index(drop=True)
     chosen = (best["spread_from"] == "candidate") & (best["spread_mm"] == learned.choice.spread_mm)
@@ -89,10 +89,10 @@ def spreads(learned, training):
 
 
 def trainings(learned):
-    """Rows of `ptt_training`, but for the experiment: mean squared errors neuron by neuron.
+    """Rows of `ptt_training` without the experiment: mean squared errors neuron by neuron.
 
-    A network that learns the "correction" answers with dp, as everywhere else here; one that learns the "position" with
-    p - dp, as the paper has it; the latter is followed with the paper's spread only.
+    A network that learns the "correction" has the output dp, as everywhere else here; one that learns the "position"
+    has p - dp, as in the paper. The latter is computed with the paper's spread only.
     """
     error, network = relative(learned.error_mm), learned.network
     frames = []
@@ -109,7 +109,7 @@ def trainings(learned):
 
 
 def _growth(learned, targets, spread_mm, new_share, validation):
-    """Mean squared errors of training, held back (`validation_mse`) and test points after every neuron."""
+    """Mean squared errors of training, validation (`validation_mse`) and test points after every neuron."""
     known = [values[learned.train] for values in (learned.command_mm, targets)]
     test = [values[~learned.train] for values in (learned.command_mm, targets)]
     growth = grow(*known, spread_mm, learned.network.neurons, new_share, *test)

@@ -6,7 +6,7 @@ TABLES = read_tables("""
 factored_determinant   float? - height_factor kappa / (D1 D2 D3); null out of reach or with inclined rails
 height_factor_mm       float? Z: zero with the platform in the plane of the rails
 kappa_mm2              float? zero where the three links' horizontal parts meet in a point or are parallel
-least_d_mm             float? least D_i: zero with a link across its rail, where J has no bound
+least_d_mm             float? least D_i: zero with a link perpendicular to its rail, where J is unbounded
 payload_kg             float  payload on the platform
 leg                    int    1 to 3
 experiment             str    name of the experiment in the configuration
@@ -14,18 +14,18 @@ point                  int    number of the point along the curve, from 1
 set                    str    train: learned from; test: the others {train, test}
 method                 str    rbf_inverse, rbf_jacobian: cross-validated network through eq. (11) or eq. (12);
     rbf_absolute: with the common height error; rbf_paper, rbf_paper_mm: the paper's spread of scaled inputs or in mm,
-    all neurons; interpolator: biharmonic spline; parameters: calibrated model; rbf_after_parameters: network on what
-    the calibration leaves
-axis                   str    z: heights count from the first point's error, as the paper's; z_mean: from the mean
-    error of all points; z_absolute: as they are {x, y, z, z_mean, z_absolute}
+    all neurons; interpolator: biharmonic spline; parameters: calibrated model; rbf_after_parameters: network on the
+    residuals of the calibration
+axis                   str    z: heights relative to the first point's error, as in the paper; z_mean: to the mean
+    error of all points; z_absolute: unchanged {x, y, z, z_mean, z_absolute}
 before_mm              float  A_b
 after_mm               float  A_a
 benefit_percent        float  P_g
-spread_from            str    candidate: of the configuration; paper_scaled, paper_mm: the paper's, read as of inputs
-    scaled to -1 .. 1 or as mm {candidate, paper_scaled, paper_mm}
-learns                 str    correction: the network answers with dp; position: with p - dp, as the paper's does
+spread_from            str    candidate: of the configuration; paper_scaled, paper_mm: the paper's, interpreted for
+    inputs scaled to -1 .. 1 or as mm {candidate, paper_scaled, paper_mm}
+learns                 str    correction: the network's output is dp; position: p - dp, as in the paper
     {correction, position}
-spread_mm              float  distance at which a neuron answers with one half
+spread_mm              float  distance at which a neuron's output is one half
 
 ## ptt_kinematics | tables/ptt_kinematics.parquet | position
 Inverse and forward kinematics of given positions (paper B, Table 2), and det J there, directly and by its factors
@@ -53,7 +53,7 @@ determinant            float? det J, numerically; null out of reach
 factored_determinant height_factor_mm kappa_mm2 least_d_mm
 
 ## ptt_encoder | tables/ptt_encoder.parquet | payload_kg leg sample
-What the linear encoder read on the bench (paper B, Fig. 7 and Table 4): every screw turned forwards, back and
+Readings of the linear encoder on the bench (paper B, Fig. 7 and Table 4): every screw turned forwards, back and
 forwards again.
 --
 payload_kg leg
@@ -67,8 +67,8 @@ Backlash of every screw under every load by eq. (19) (paper B, Table 5).
 --
 payload_kg leg
 backlash_mm            float  e_j: mean of the next two
-first_mm               float  e_j1: reverse pass less the first forward one, mean over the same places
-second_mm              float  e_j2: reverse pass less the second forward one
+first_mm               float  e_j1: reverse pass minus the first forward one, mean over the same places
+second_mm              float  e_j2: reverse pass minus the second forward one
 standard_error_mm      float  of backlash_mm, from the scatter over the places
 true_mm                float  the virtual screw's
 
@@ -81,7 +81,7 @@ compensated            bool   whether the command jumped by the measured backlas
 travel_mm              float  K: between the slider's outermost places
 scatter_mm             float  standard deviation over the repeats, pooled over the places
 per_travel_um_per_mm   float  sigma_1 or sigma_2: scatter over travel
-noise_um_per_mm        float  what the tracker's noise alone would give
+noise_um_per_mm        float  the value from the tracker's noise alone
 
 ## ptt_points | tables/ptt_points.parquet | experiment point
 Every point of every experiment: measured, corrected, and driven again with the chosen network (paper B, Tables 7 and
@@ -90,8 +90,8 @@ Every point of every experiment: measured, corrected, and driven again with the 
 experiment point set
 command_{xyz}_mm       float  commanded position
 measured_{xyz}_mm      float  measured position before compensation
-corrected_{xyz}_mm     float  p - dp: command less error
-network_{xyz}_mm       float  the network's corrected position less that one
+corrected_{xyz}_mm     float  p - dp: command minus error
+network_{xyz}_mm       float  the network's corrected position minus that one
 before_{xyz}_mm        float  error before compensation, z from the first point's
 after_{xyz}_mm         float  error when driven again with the network's correction, z from the first point's
 before_z_absolute_mm   float  height error before compensation
@@ -102,14 +102,14 @@ Mean absolute errors before and after every kind of compensation, driven again, 
 and Fig. 17).
 --
 experiment method set axis before_mm after_mm benefit_percent
-benefit_low_percent    float? 5 % quantile over redraws: fresh noise in the measurements and when driven again, fresh
+benefit_low_percent    float? 5 % quantile over redraws: new noise in the measurements and when driven again, new
     split into training and test points; null for methods that are not redrawn
 benefit_high_percent   float? 95 % quantile
 
 ## ptt_start | tables/ptt_start.parquet | experiment start_deg axis
-ptt_benefit of rbf_jacobian on the test points, the curve begun at other azimuths, one draw each. The paper's z hangs
-on the first point. The configured start was chosen where no slider reverses; other starts do worse by the paper's
-measure, hardly by z_mean.
+ptt_benefit of rbf_jacobian on the test points, for other start azimuths of the curve, one draw each. The paper's z
+depends on the first point. At the configured start no slider reverses; other starts are worse in the paper's measure
+and hardly worse in z_mean.
 --
 experiment
 start_deg              float  azimuth of the first point
@@ -121,40 +121,39 @@ Mean squared error of the network as neurons are added (paper B, Fig. 13).
 experiment spread_from learns spread_mm
 neurons                int    hidden neurons
 train_mse_mm2          float  on the training points, mean over the axes
-validation_mse_mm2     float  on training points held back in turn
+validation_mse_mm2     float  by cross-validation on the training points
 test_mse_mm2           float  on the test points
 
 ## ptt_spread | tables/ptt_spread.parquet | experiment spread_from learns spread_mm
-Every spread with the number of neurons that cross-validation finds best for it (paper B, 3.3, prints 3.4 to 3.8
+Every spread with its best number of neurons by cross-validation (paper B, 3.3, prints 3.4 to 3.8
 without a unit).
 --
 experiment spread_from learns spread_mm
 chosen                 bool   true for the candidate that is used
 neurons                int    with the least cross-validated error
 train_rms_mm           float  error per axis on the training points
-validation_rms_mm      float  error per axis on training points held back in turn
+validation_rms_mm      float  error per axis by cross-validation on the training points
 test_rms_mm            float  error per axis on the test points
 
 ## ptt_corrections | tables/ptt_corrections.parquet | experiment point leg
-What the chosen network moves every slider by, through the exact inverse kinematics and through the Jacobian (paper B,
-Fig. 15).
+Corrections of every slider by the chosen network, through the exact inverse kinematics and through the Jacobian (paper
+B, Fig. 15).
 --
 experiment point leg
 nominal_mm             float  slider position without correction
 inverse_mm             float  correction by eq. (11)
 jacobian_mm            float  correction by eq. (12)
-difference_um          float  the former less the latter
+difference_um          float  the former minus the latter
 
 ## ptt_extrapolation | tables/ptt_extrapolation.parquet | experiment family size method axis
-What a correction is worth where it was not learned: the curve changed, errors without and with the correction, all
-points.
+Extrapolation of a correction: errors on a changed curve without and with it, all points.
 --
 experiment
-family                 str    what is changed; reverse: the same curve backwards {none, radius_mm, height_mm, reverse,
-    payload_kg}
+family                 str    the changed quantity; reverse: the same curve backwards {none, radius_mm, height_mm,
+    reverse, payload_kg}
 size                   float  by how much, in the unit that the family names
 method axis
 before_mm              float  mean absolute error of the changed curve without correction
 after_mm               float  with correction
-benefit_percent        float  as in ptt_benefit; below zero where the correction harms
+benefit_percent        float  as in ptt_benefit; negative where the correction increases the errors
 """)

@@ -18,14 +18,14 @@ from rrru.studies.real.steps import counted, held_by_robot, held_out, rms, verdi
 
 MODELS, UNDIAGNOSED = "abcde", "undiagnosed"
 _FUNCTION, _WAVES, _SHOWN = ("drive_error_function", 0), ("transmission_orders", 0), 40
-# a reading held out is far off from so many medians on; so many are told
-_FAR, _TOLD = 20.0, 6
-# what ingest says of every such series
+# a held-out residual above this many medians is far off; most readings that a note names
+_FAR, _MAX_NAMED = 20.0, 6
+# notes of ingest on every such series
 _USUAL = ("no column", "undeclared columns left out", "no commanded positions")
 
 
 def tables(studied: Studied) -> dict[str, pd.DataFrame]:
-    """Frames by name, without the campaign; those of the diagnosis are empty where there is none."""
+    """Frames by name, without the campaign; those of the diagnosis are empty without a diagnosis."""
     found = studied.diagnosis
     return {
         "real_verdicts": pd.DataFrame([_verdict(studied)]),
@@ -41,9 +41,9 @@ def tables(studied: Studied) -> dict[str, pd.DataFrame]:
 def _verdict(studied: Studied) -> dict:
     """The row of `real_verdicts`."""
     found, series, left = _found(studied), studied.series, studied.held_out_mm
-    told = ("effects", "probability", "where", "confusable_with", "noise_rms_mm", "gap_rms_mm", "gap_after_rms_mm")
-    told = (*told, "share_closed", "share_closed_low", "share_closed_high", "noise_stated_mm", "next_runs", "points")
-    own = {name: found[name] for name in (*told, "dropped_points")}
+    names = ("effects", "probability", "where", "confusable_with", "noise_rms_mm", "gap_rms_mm", "gap_after_rms_mm")
+    names = (*names, "share_closed", "share_closed_low", "share_closed_high", "noise_stated_mm", "next_runs", "points")
+    verdict = {name: found[name] for name in (*names, "dropped_points")}
     before = studied.step("b").held_out_mm
     notes = (
         f"no cause is named: {found['no_answer']}" if found["no_answer"] else "",
@@ -52,7 +52,7 @@ def _verdict(studied: Studied) -> dict:
         _far(studied),
         *(note for note in studied.notes if not note.startswith(_USUAL)),
     )
-    return own | {
+    return verdict | {
         **named(series),
         "predicted_share": predicted_share(studied),
         "held_out_share": 1.0 - (rms(left) / rms(before)) ** 2,
@@ -63,20 +63,21 @@ def _verdict(studied: Studied) -> dict:
 
 
 def _far(studied: Studied) -> str:
-    """Which readings on the rows held out no law comes near, and what is left without them, in words; "" if none."""
+    """Held-out readings with far larger residuals, and the rms without them, in words; "" if none."""
     frame, left = studied.measurements, studied.held_out_mm
     held = (frame["status"] == rows.HELD_OUT).to_numpy() & held_by_robot(studied.case)
     far = left > _FAR * np.median(left) if len(left) else np.zeros(0, dtype=bool)
     if not far.any():
         return ""
-    own = studied.rows[held][far]
-    readings = [f"row {row} of {target}" for row, target in zip(own[PLACE], own["target"], strict=True)]
-    more = f" and {len(readings) - _TOLD} more" if len(readings) > _TOLD else ""
-    return f"far off among those held out: {', '.join(readings[:_TOLD])}{more}; without: {rms(left[~far]):.3g} mm rms"
+    outliers = studied.rows[held][far]
+    readings = [f"row {row} of {target}" for row, target in zip(outliers[PLACE], outliers["target"], strict=True)]
+    more = f" and {len(readings) - _MAX_NAMED} more" if len(readings) > _MAX_NAMED else ""
+    shown = ", ".join(readings[:_MAX_NAMED])
+    return f"far off among those held out: {shown}{more}; without: {rms(left[~far]):.3g} mm rms"
 
 
 def _found(studied: Studied) -> Mapping[str, Any]:
-    """The verdict of the diagnosis; without one what a series has that nobody has diagnosed."""
+    """The verdict of the diagnosis, or the default values of a series without diagnosis."""
     if studied.diagnosis:
         return studied.diagnosis.verdict
     texts = dict.fromkeys(("where", "confusable_with", "next_runs", "notes", "no_answer"), "")
@@ -84,34 +85,35 @@ def _found(studied: Studied) -> Mapping[str, Any]:
 
 
 def _waves(studied: Studied) -> str:
-    """Whether a few sharp waves of single drives do, or a rough function of their angles, in words; "" if neither.
+    """Evidence for sharp waves of single drives against a rough function of their angles, in words; "" if neither.
 
-    Each beside the other causes of the verdict, at the strengths that these have.
+    Each is added to the other causes of the verdict, at their prior scales.
     """
     library, named = studied.case.library, (_FUNCTION[0], _WAVES[0])
     if studied.diagnosis is None or not all(name in library for name in named):
         return ""
     inference = studied.diagnosis.inference
     hypothesis, level = inference.hypothesis, inference.level
-    rest = tuple(term for term in hypothesis.terms if term.effect not in named)
-    fixed = [[strength] for strength in hypothesis.strengths_of(rest, level)]
+    others = tuple(term for term in hypothesis.terms if term.effect not in named)
+    fixed = [[strength] for strength in hypothesis.strengths_of(others, level)]
 
-    def told(*names: str) -> float:
-        """Log evidence of laws beside the rest."""
-        terms, grids = (*rest, *map(EffectTerm, names)), (*fixed, *(PRIOR_SCALES for _ in names))
+    def log_evidence(*names: str) -> float:
+        """Log evidence of effects added to the others."""
+        terms, grids = (*others, *map(EffectTerm, names)), (*fixed, *(PRIOR_SCALES for _ in names))
         return float(averaged(inference.evidence.over_strengths(terms, grids, [level])[0], len(names))[0])
 
-    neither, function, waves = told() if rest else inference.evidence.none[level], *map(told, named)
+    neither = log_evidence() if others else inference.evidence.none[level]
+    function, waves = map(log_evidence, named)
     if function < neither:
         return ""
     count = len(library[_WAVES[0]].coordinates) // 2
     said = f"a rough function of every drive's angle and {count} sharp waves of single drives both explain errors"
-    likelier = "the function" if function > waves else "the waves"
-    return f"{said}; {likelier} by {abs(function - waves):.0f} nats of evidence"
+    better = "the function" if function > waves else "the waves"
+    return f"{said}; log Bayes factor {abs(function - waves):.0f} for {better}"
 
 
 def _by_model(studied: Studied, reference: Mapping[str, Any]) -> dict[str, float]:
-    """Held-out rms of the models' letters, ours and others'; of the kinds of compliance that of the last."""
+    """Held-out rms by letter of the model, ours and published ones; of the compliances that of the last one."""
     ours = {step.model[0]: rms(step.held_out_mm) for step in studied.steps}
     stated = reference.get(studied.series.label, {})
     result = {f"held_out_{model}_rms_mm": ours.get(model, np.nan) for model in MODELS}
@@ -119,21 +121,21 @@ def _by_model(studied: Studied, reference: Mapping[str, Any]) -> dict[str, float
 
 
 def predicted_share(studied: Studied) -> float:
-    """Share of the mean square of the calibrated model's misses that the causes take off, by folds of training rows."""
+    """Fraction of the calibrated model's mean square residual that the causes explain, by cross-validation."""
     if studied.diagnosis is None:
         return np.nan
     inference = studied.diagnosis.inference
     hypothesis, level = inference.hypothesis, inference.level
-    at = counted(studied.case)
-    misses = [
-        (inference.held_out.predict(terms, strengths, level, uncertain=False).residual_mm[at] ** 2).sum(axis=1).mean()
-        for terms, strengths in (((), ()), (hypothesis.terms, hypothesis.strengths[level]))
+    used = counted(studied.case)
+    squares = [
+        (inference.held_out.predict(terms, strengths, level, uncertain=False).residual_mm[used] ** 2).sum(axis=1).mean()
+        for terms, strengths in (((), ()), (hypothesis.terms, hypothesis.prior_scales[level]))
     ]
-    return float(1.0 - misses[1] / misses[0])
+    return float(1.0 - squares[1] / squares[0])
 
 
 def _steps(studied: Studied) -> pd.DataFrame:
-    """Rows of `real_steps`: the plain models, and that of the verdict."""
+    """Rows of `real_steps`: the plain models, and the model of the verdict."""
     made = [*studied.steps]
     if studied.diagnosis:
         made.append(verdict_step(studied.case, studied.state, studied.seconds["gap"]))
@@ -168,7 +170,7 @@ def _points(studied: Studied) -> pd.DataFrame:
 
 
 def _spectrum(studied: Studied) -> pd.DataFrame:
-    """Rows of `real_spectrum`, of the joints that turn."""
+    """Rows of `real_spectrum` of the rotary joints."""
     case, robot = studied.case, studied.case.mechanism
     orders, parts = np.arange(1, _SHOWN + 1), []
     found = studied.state.effects.get(_FUNCTION)
@@ -181,9 +183,9 @@ def _spectrum(studied: Studied) -> pd.DataFrame:
             errors = studied.diagnosis.tables["gap_parameters"]
             errors = errors.loc[errors["effect"] == _FUNCTION[0], "standard_error"].to_numpy()
             shape = len(robot.parts.drives), -1, 2
-            own = np.reshape(found, shape)[number, : len(orders)]
-            error[: len(own)] = np.reshape(errors, shape)[number, : len(orders)].mean(axis=1)
-            sine[: len(own)], cosine[: len(own)] = own.T
+            waves = np.reshape(found, shape)[number, : len(orders)]
+            error[: len(waves)] = np.reshape(errors, shape)[number, : len(orders)].mean(axis=1)
+            sine[: len(waves)], cosine[: len(waves)] = waves.T
         reach = float(np.ptp(case.motion.drive[case.used][:, number]))
         parts.append(
             pd.DataFrame(

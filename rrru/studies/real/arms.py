@@ -1,4 +1,4 @@
-"""One real series of an arm: ingested, calibrated, diagnosed on its training rows, judged on those held out.
+"""One real series of an arm: ingested, calibrated and diagnosed on its training rows, evaluated on held-out rows.
 
 Lengths in mm, angles in rad.
 """
@@ -28,22 +28,22 @@ from rrru.kinematics.robot import Robot
 from rrru.studies import setup
 from rrru.studies.real import chains
 from rrru.studies.real.series import Series
-from rrru.studies.real.sheets import HELD_OUT, in_file, joint_columns, retold, sheet, stated_noise
-from rrru.studies.real.steps import Step, held_out_mm, laws, steps
+from rrru.studies.real.sheets import HELD_OUT, in_file, in_series_terms, joint_columns, sheet, stated_noise
+from rrru.studies.real.steps import Step, held_out_mm, library_effects, steps
 
-# an arm's masses are those of its links
+# the masses of an arm are in its links
 NO_MASSES = Masses(0.0, 0.0, 0.0)
-# ASSUME no calibrated arm's orientations are off by so many rad, at the median; angles read in another sequence are
-_TURNED = 0.1
+# ASSUME the median orientation error of a calibrated arm is below this (rad); a wrong Euler sequence exceeds it
+_MAX_ORIENTATION_RAD = 0.1
 
 
 @dataclass(frozen=True)
 class Studied:
-    """A series with all that was found of it.
+    """A series with its results.
 
-    rows: the sheet; measurements: of all its rows; robot: with the numbers that its training rows tell; plain: the case
-    of the plain models, the steps; diagnosis: of the training rows, None where they are too few; held_out_mm (n,): what
-    its named causes, without a diagnosis its geometry, leave on the rows held out.
+    rows: the sheet; measurements: of all its rows; robot: with the parameters that its training rows observe; plain:
+    the case of the plain models; steps: these models; diagnosis: of the training rows, None where they are too few;
+    held_out_mm (n,): held-out residuals with the named causes, or with the geometry alone without a diagnosis.
     """
 
     series: Series
@@ -58,23 +58,23 @@ class Studied:
     notes: tuple[str, ...]
 
     def step(self, model: str) -> Step:
-        """The step of a model's letter."""
+        """The step of a model by its letter."""
         return next(step for step in self.steps if step.model == model)
 
     @property
     def case(self) -> Case:
-        """The case of the diagnosis, without one that of the plain models."""
+        """The case of the diagnosis, or of the plain models without a diagnosis."""
         return self.diagnosis.inference.case if self.diagnosis else self.plain
 
     @property
     def state(self) -> State:
-        """The corrected sim, without a diagnosis the calibrated one."""
+        """The State of the corrected model, or of the calibrated one without a diagnosis."""
         return self.diagnosis.state if self.diagnosis else self.step("b").state
 
 
 @dataclass(frozen=True)
 class Prepared:
-    """A series that has been read and ingested; noise: that the instrument states, in mm and rad, None where none."""
+    """A series after reading and ingest; noise: as stated by the instrument, in mm and rad, None where not stated."""
 
     series: Series
     rows: pd.DataFrame
@@ -86,9 +86,9 @@ class Prepared:
 
 
 def prepared(series: Series, robots: Mapping[str, Any], sheet_file: Path) -> Prepared:
-    """The series, ingested from the sheet that is written to a parquet file.
+    """The series, ingested from a sheet that this function writes to a parquet file.
 
-    robots: entries of the configuration's `robots:`. Raises ConfigError and IngestError for what cannot be used.
+    robots: entries of the configuration's `robots:`. Raises ConfigError and IngestError for unusable data.
     """
     began = time.perf_counter()
     raw, nominal = series.read(), nominal_robot(series, robots)
@@ -98,17 +98,19 @@ def prepared(series: Series, robots: Mapping[str, Any], sheet_file: Path) -> Pre
     sheet_file.parent.mkdir(parents=True, exist_ok=True)
     table.to_parquet(sheet_file, index=False)
     seen = [name for name in series.section["readings"] if (table["target"] == name).any()]
-    beside = [name for name in series.section.get("world_targets", ()) if name in seen]
-    if len(beside) == len(seen):
-        raise ConfigError(f"{series.file}: seen are {', '.join(seen)} alone; allowed: with one that the robot holds")
-    spec = {"ingest": str(sheet_file), "frame": "register", "extra_columns": "ignore", "world_targets": beside}
+    fixed = [name for name in series.section.get("world_targets", ()) if name in seen]
+    if len(fixed) == len(seen):
+        raise ConfigError(
+            f"{series.file}: only world_targets were measured ({', '.join(seen)}); allowed: at least one on the robot"
+        )
+    spec = {"ingest": str(sheet_file), "frame": "register", "extra_columns": "ignore", "world_targets": fixed}
     try:
         ingested = ingest(IngestSpec.from_config(spec), mechanism)
     except IngestError as error:
-        raise retold(error, series, table) from error
+        raise in_series_terms(error, series, table) from error
     measurements = rows.hold_out(ingested.measurements, table[HELD_OUT].to_numpy())
     robot, noise = setup.measured_robot(nominal, measurements), stated_noise(series, raw)
-    unseen = tuple(f"{name} was never seen" for name in series.section["readings"] if name not in seen)
+    unseen = tuple(f"{name} was never measured" for name in series.section["readings"] if name not in seen)
     notes = unseen + tuple(in_file(note, table) for note in ingested.notes)
     return Prepared(series, table, measurements, robot, noise, time.perf_counter() - began, notes)
 
@@ -119,25 +121,25 @@ def study(series: Series, robots: Mapping[str, Any], settings: GapSettings, shee
 
 
 def studied(known: Prepared, settings: GapSettings) -> Studied:
-    """A series with its plain models and its diagnosis; raises ConfigError and FitError as these steps do."""
+    """A series with its plain models and its diagnosis; raises their ConfigError and FitError."""
     plain, made = _reference(known)
-    at = {"ingest": known.seconds} | {step.model: step.seconds for step in made}
+    seconds = {"ingest": known.seconds} | {step.model: step.seconds for step in made}
     began, notes = time.perf_counter(), known.notes
     measured = MeasuredRobot(known.robot, NO_MASSES, known.noise[0], known.series.name, known.noise[1])
     try:
         found = diagnose(known.measurements, measured, settings, details=False)
         left = held_out_mm(found.inference.case, found.state)
     except FitError as error:
-        # its calibration still tells something
+        # the calibration alone is still a result
         found, left = None, next(step for step in made if step.model == "b").held_out_mm
         notes = (f"not diagnosed: {error}", *notes)
-    at["gap"] = time.perf_counter() - began
-    own = known.series, known.rows, known.measurements, known.robot
-    return Studied(*own, plain, made, found, left, at, notes)
+    seconds["gap"] = time.perf_counter() - began
+    prepared_fields = known.series, known.rows, known.measurements, known.robot
+    return Studied(*prepared_fields, plain, made, found, left, seconds, notes)
 
 
 def nominal_robot(series: Series, robots: Mapping[str, Any]) -> dict:
-    """The nominal robot of a series, as `rrru.studies.setup` takes it: an entry of `robots:`, or a chain's file."""
+    """The nominal robot of a series for `rrru.studies.setup`: an entry of `robots:`, or a chain's file."""
     section = series.section
     if "chain" in section:
         name, dimensions = series.dataset, _chain(series)
@@ -147,7 +149,7 @@ def nominal_robot(series: Series, robots: Mapping[str, Any]) -> dict:
 
 
 def _chain(series: Series) -> dict:
-    """The robot of a chain's file; raises ConfigError where there is none, or none of this form."""
+    """The robot of a chain's file; raises ConfigError for a missing or malformed file."""
     file = series.file.parent / series.section["chain"]
     where, allowed = f"real.sets.{series.dataset}.chain: {file}", "a JSON file, see rrru/studies/real/chains.py"
     try:
@@ -159,7 +161,7 @@ def _chain(series: Series) -> dict:
 
 
 def _check_joints(series: Series, joints: Mapping[str, str], mechanism: Robot) -> None:
-    """Raise ConfigError where the joints that are told are not those of the robot."""
+    """Raise ConfigError where the stated joints are not those of the robot."""
     columns = mechanism.parts.columns
     where, allowed = f"real.sets.{series.dataset}.joints", f"{', '.join(columns)} of robot {mechanism.name}"
     lacking = [name for name in columns if name not in joints]
@@ -171,10 +173,10 @@ def _check_joints(series: Series, joints: Mapping[str, str], mechanism: Robot) -
 
 
 def _reference(known: Prepared) -> tuple[Case, tuple[Step, ...]]:
-    """The reference models of a series, each fitted to its training rows, and their case."""
+    """The case of the reference models of a series, and these models, each fitted to its training rows."""
     nominal, measurements, turned = sim(known.robot), known.measurements, rows.has_turns(known.measurements)
     arm_mm = nominal.angle_arm_mm if turned else np.nan
-    case = make_case(measurements, nominal, NO_MASSES, known.noise[0] or 1.0, laws(nominal), True, arm_mm)
+    case = make_case(measurements, nominal, NO_MASSES, known.noise[0] or 1.0, library_effects(nominal), True, arm_mm)
     if turned:
         case = with_arm(case, *known.noise)
     made = steps(case)
@@ -184,10 +186,11 @@ def _reference(known: Prepared) -> tuple[Case, tuple[Step, ...]]:
 
 
 def _check_turned(series: Series, case: Case, state: State) -> None:
-    """Raise ConfigError where a calibrated robot's orientations have nothing to do with those that were read."""
+    """Raise ConfigError where the orientations of the calibrated robot disagree with the measured ones."""
     off_rad = float(np.median(np.linalg.norm(case.residual(state)[~case.positions], axis=1)) / case.arm_mm)
-    if off_rad > _TURNED:
+    if off_rad > _MAX_ORIENTATION_RAD:
         raise ConfigError(
-            f"{series.file}: orientations are off by {off_rad:.2g} rad, calibrated; allowed: {_TURNED:g}: does "
-            f"real.sets.{series.dataset}.readings have their sequence, rotation_unit and order of columns?"
+            f"{series.file}: orientations have errors of {off_rad:.2g} rad after calibration; allowed: "
+            f"{_MAX_ORIENTATION_RAD:g}; check sequence, rotation_unit and order of columns in "
+            f"real.sets.{series.dataset}.readings"
         )

@@ -1,4 +1,4 @@
-"""Belt machines whose sled is nowhere measured: only the lengths of the belts are, and what their count leaves out.
+"""Belt machines without measured sled positions: frame, missing lengths and scales from belt lengths alone.
 
 A set of `real: sets:`
 
@@ -11,9 +11,9 @@ A set of `real: sets:`
       row: row    # column that numbers the rows; absent: row, or from 1
       dimensions: 2    # of the sled's places: 2 (default), or 3 without heights
 
-There are at least `dimensions + 1` belts. Their order fixes the frame, of which lengths alone know no place: the anchor
-of the first is the origin, the second lies on the x axis, the third above it. Lengths do not tell a frame from its
-mirror image either, nor one with all belts longer by a common factor: this is held at 1.
+There are at least `dimensions + 1` belts. Lengths alone do not determine the placement of the frame; the order of the
+belts fixes it: the anchor of the first is the origin, the second is on the x axis, the third above it. The mirror image
+of the frame and a common factor of all belts are not identifiable either; the factor is fixed at 1.
 """
 
 import numpy as np
@@ -23,13 +23,13 @@ from scipy import linalg
 from rrru.estimation.observations.length_starts import propose_anchors
 from rrru.estimation.observations.lengths import Lengths
 from rrru.studies.real import length_tables
-from rrru.studies.real.length_laws import UNEXPLAINED, LengthCase, frame_columns, ways_of
+from rrru.studies.real.length_laws import UNEXPLAINED, LengthCase, frame_columns, variants_of
 from rrru.studies.real.lengths_section import MM, Section, held_out, numbers, row_numbers
 
 MISSING, SCALE = "missing_length", "length_scale"
 _NEEDED, _OPTIONAL = ("kind", "files", "lengths"), ("heights_mm", "unit", "row", "dimensions")
-# ASSUME a count leaves out up to 8 % of the mean length either way, 1 sigma: all belts alike in most machines, since
-# they are built alike; belts of a machine differ in scale by 4 mm per m, 1 sigma, as stretched toothed belts do
+# ASSUME missing lengths of 8 % of the mean length, 1 sigma, mostly equal for all belts since these are built alike;
+# ASSUME scales of the belts of a machine differ by 4 mm per m, 1 sigma, as those of stretched toothed belts do
 _MISSING_SHARE, _ALIKE, _SINGLE, _EACH = 0.08, 0.35, 0.1, 0.05
 _SCALE_RANGE, _SCALED = 0.004, 0.5
 
@@ -38,7 +38,7 @@ def study(frame, section, name):
     """Tables of one calibration: real_verdicts, real_steps, real_parameters, real_points.
 
     frame: one row per place of the sled; section: as above; name: of the set, for messages and `dataset`. Raises
-    ConfigError and IngestError for what is no such set, FitError where the lengths tell no machine.
+    ConfigError and IngestError for an invalid set, FitError where the lengths do not determine the machine.
     """
     read = Section(section, name, _NEEDED, _OPTIONAL)
     case, belts = length_case(frame, read)
@@ -65,7 +65,7 @@ def length_case(frame, read):
     if len(set(columns.values())) < len(belts):
         read.refuse("lengths", list(columns.values()), "another column for each belt")
     if len(belts) <= dimensions:
-        read.refuse("lengths", belts, f"at least {dimensions + 1} belts: fewer leave every place unchecked")
+        read.refuse("lengths", belts, f"at least {dimensions + 1} belts: fewer give no redundancy")
     if dimensions == 3 and read.given("heights_mm"):
         read.refuse("heights_mm", read.given("heights_mm"), "nothing where dimensions is 3")
     heights = read.heights("heights_mm", belts)
@@ -75,8 +75,8 @@ def length_case(frame, read):
     counted = factor * numbers(frame, list(columns.values()), read.given("files"), least, above=0.0)
     count, short = len(belts), counted.mean(axis=0) <= heights
     if short.any():
-        told = f"{belts[short.argmax()]} {counted.mean(axis=0)[short.argmax()]:.3g} mm long on average"
-        read.refuse("unit", told, "belts longer than their heights_mm")
+        shortest = f"{belts[short.argmax()]} {counted.mean(axis=0)[short.argmax()]:.3g} mm long on average"
+        read.refuse("unit", shortest, "belts longer than their heights_mm")
     basis, _ = frame_columns(count, dimensions, count)
     origin = np.append(np.zeros(count * dimensions + count), np.ones(count))
     bare = Lengths(counted, np.eye(count), heights, origin, basis)
@@ -84,26 +84,26 @@ def length_case(frame, read):
 
 
 def _missing(bare, belts):
-    """Ways of a length to miss: of all belts alike, of one, of each its own."""
+    """Variants of a missing length: common to all belts, of one belt, one per belt."""
     count = len(belts)
     starts = np.eye(len(bare.origin))[:, -2 * count : -count]
     span = _MISSING_SHARE * float(bare.counted.mean())
-    told = [("all belts alike", "a common missing length", starts.sum(axis=1, keepdims=True), _ALIKE)]
-    told += [(belt, f"a missing length of {belt}", starts[:, [k]], _SINGLE / count) for k, belt in enumerate(belts)]
-    told += [(", ".join(belts), "a missing length per belt", starts, _EACH)]
-    return ways_of(MISSING, told, lambda columns: np.full(columns.shape[1], span))
+    variants = [("all belts alike", "a common missing length", starts.sum(axis=1, keepdims=True), _ALIKE)]
+    variants += [(belt, f"a missing length of {belt}", starts[:, [k]], _SINGLE / count) for k, belt in enumerate(belts)]
+    variants += [(", ".join(belts), "a missing length per belt", starts, _EACH)]
+    return variants_of(MISSING, variants, lambda columns: np.full(columns.shape[1], span))
 
 
 def _scale(bare):
-    """The belts' scales: their mean is the frame's, which lengths do not tell."""
+    """The belts' scales relative to their mean, which lengths do not determine."""
     count = bare.counted.shape[1]
     factors = np.eye(len(bare.origin))[:, -count:] @ linalg.null_space(np.ones((1, count)))
-    told = [("each belt its own", "a scale per belt", factors, _SCALED)]
-    return ways_of(SCALE, told, lambda columns: np.full(columns.shape[1], _SCALE_RANGE))
+    variants = [("each belt its own", "a scale per belt", factors, _SCALED)]
+    return variants_of(SCALE, variants, lambda columns: np.full(columns.shape[1], _SCALE_RANGE))
 
 
 def _starts(lengths):
-    """Values (p,) to start from, out of the lengths themselves."""
+    """Start values (p,) from the lengths themselves."""
     inverse = np.linalg.pinv(lengths.basis)
     for anchors, missing in propose_anchors(lengths.counted, lengths.heights_mm, lengths.dimensions):
         full = np.concatenate([anchors.ravel(), np.full(len(anchors), missing), np.ones(len(anchors))])
@@ -111,9 +111,9 @@ def _starts(lengths):
 
 
 def _chain(case, chosen):
-    """Models in the order in which their laws are added, the verdict's last."""
+    """Combinations of effect models in the order of the steps, the verdict's last."""
     common, each = case.laws[MISSING][0], case.laws[MISSING][-1]
-    missing = [law for law in chosen.laws if law.effect == MISSING] or [common]
+    missing = [effect_model for effect_model in chosen.laws if effect_model.effect == MISSING] or [common]
     chain = [(), (common,), (each,), (*missing, *case.laws[SCALE]), case.laws[SCALE], chosen.laws]
     return list(dict.fromkeys(chain))
 
@@ -125,13 +125,13 @@ def _first_missing(hypothesis):
 
 
 def _common(case, chosen):
-    """The Hypothesis of one common missing length beside the other laws of the chosen one."""
-    others = [law for law in chosen.laws if law.effect != MISSING]
+    """The Hypothesis of one common missing length together with the other effect models of the chosen one."""
+    others = [effect_model for effect_model in chosen.laws if effect_model.effect != MISSING]
     return case.hypothesis([case.laws[MISSING][0], *others])
 
 
 def _parameters(case, chosen, belts):
-    """Rows of real_parameters: anchors, missing lengths and scales under the chosen laws."""
+    """Rows of real_parameters: anchors, missing lengths and scales of the chosen Hypothesis."""
     fit = chosen.fit
     _, missing, scale = fit.lengths.machine(fit.values)
     _, missing_errors, scale_errors = fit.lengths.split(chosen.standard_errors)
@@ -139,7 +139,7 @@ def _parameters(case, chosen, belts):
     common = _common(case, chosen)
     if common is not None:
         note = "" if common is chosen else "if one were common to all belts; not part of the verdict. "
-        note += _alike_words(common)
+        note += _independent_error(common)
         rows.append(length_tables.parameter("missing_length", "mm", *_first_missing(common), 0.0, note))
     if MISSING in chosen.effects and common is not chosen:
         rows += [
@@ -156,24 +156,26 @@ def _parameters(case, chosen, belts):
     return rows
 
 
-def _alike_words(hypothesis):
-    """What the standard error of a missing length would be, were it not that neighbouring rows err alike."""
-    if not hypothesis.alike:
+def _independent_error(hypothesis):
+    """The standard error of a missing length for independent errors, in words, where the errors are correlated."""
+    if not hypothesis.correlated:
         return ""
     error = hypothesis.fit.lengths.split(hypothesis.fit.standard_errors)[1][0]
-    return f"+- {error:.1f} mm if neighbouring rows did not err alike, which they do"
+    return f"+- {error:.1f} mm for independent rows, but errors of neighbouring rows are correlated"
 
 
 def _words(case, verdict, belts):
-    """Notes (sentences), where, next_runs and what is confusable, of a verdict."""
+    """Notes (sentences), where, next_runs and confounded effects of a verdict."""
     effects, _, chosen = verdict
     notes, where, rivals = [], [], []
     if MISSING in effects:
-        law = next(law for law in chosen.laws if law.effect == MISSING)
-        where.append(law.where)
-        notes.append(_missing_words(case, chosen, law, belts))
-        if case.probability_of(lambda laws: law in laws) < 0.9 * case.probability_of(_misses):
-            notes.append("Whether all belts miss the same length these rows do not settle.")
+        effect_model = next(effect_model for effect_model in chosen.laws if effect_model.effect == MISSING)
+        where.append(effect_model.where)
+        notes.append(_missing_words(case, chosen, effect_model, belts))
+        if case.probability_of(lambda effect_models: effect_model in effect_models) < 0.9 * case.probability_of(
+            _misses
+        ):
+            notes.append("These rows do not determine whether all belts miss the same length.")
             rivals.append("missing_length of other belts")
     else:
         notes.append(_none_missing_words(case, chosen))
@@ -186,34 +188,37 @@ def _words(case, verdict, belts):
             f"Belt {belts[high]} is longer than counted by {1e3 * scale[high]:.2f} mm per m and {belts[low]} by"
             f" {1e3 * scale[low]:.2f}, against the mean of all belts."
         )
-    elif case.probability_of(lambda laws: SCALE in [law.effect for law in laws]) > 0.1:
-        notes.append("A scale of its own for each belt is possible, these rows do not settle it.")
+    elif (
+        case.probability_of(lambda effect_models: SCALE in [effect_model.effect for effect_model in effect_models])
+        > 0.1
+    ):
+        notes.append("A separate scale per belt is possible; these rows do not determine it.")
         rivals.append(SCALE)
     if UNEXPLAINED in effects:
         notes.append(
-            f"{chosen.smooth_mm:.1f} mm are left that follow the place smoothly and that no law here explains"
-            " (tension, arms that swing and heights are not measured)."
+            f"No effect model explains a smooth residual of {chosen.smooth_mm:.1f} mm that depends on the place"
+            " (tension, swinging arms and heights are not measured)."
         )
-    next_runs = "one tape measurement between two anchors: lengths alone do not tell a scale that all belts share"
+    next_runs = "one tape measurement between two anchors: lengths alone do not determine a common scale of all belts"
     if {SCALE, UNEXPLAINED} & set(effects):
-        next_runs += "; the same places once more with the belts pulled harder: stretch changes, scales do not"
+        next_runs += "; the same places again with more belt tension: stretch changes, scales do not"
     return notes, ", ".join(where), next_runs, ", ".join(dict.fromkeys(rivals))
 
 
-def _misses(laws):
-    """Whether any missing length is among laws."""
-    return MISSING in [law.effect for law in laws]
+def _misses(effect_models):
+    """Whether a missing length is among effect models."""
+    return MISSING in [effect_model.effect for effect_model in effect_models]
 
 
-def _missing_words(case, chosen, law, belts):
-    """What misses, and how wrong the frame is without it."""
+def _missing_words(case, chosen, effect_model, belts):
+    """The missing lengths in words, and the error of the frame without them."""
     _, missing, _ = chosen.fit.lengths.machine(chosen.fit.values)
     error = chosen.fit.lengths.split(chosen.standard_errors)[1]
     acting = np.flatnonzero(error > 0.0)
-    if law is case.laws[MISSING][0]:
+    if effect_model is case.laws[MISSING][0]:
         side = "longer" if missing[0] > 0.0 else "shorter"
         said = f"Every belt is {abs(missing[0]):.1f} +- {error[0]:.1f} mm {side} than counted"
-        independent = _alike_words(chosen)
+        independent = _independent_error(chosen)
         said += f" ({independent})" if independent else ""
     else:
         said = "; ".join(
@@ -226,18 +231,18 @@ def _missing_words(case, chosen, law, belts):
         return f"{said}."
     sizes = [_size_mm(one.fit) for one in (without, chosen)]
     wrong, side = ("small" if sizes[0] < sizes[1] else "large"), f"from {belts[0]} to {belts[1]}"
-    return f"{said}: without it the frame comes out {abs(sizes[1] - sizes[0]) / 1000.0:.2f} m too {wrong} {side}."
+    return f"{said}: without it the frame is {abs(sizes[1] - sizes[0]) / 1000.0:.2f} m too {wrong} {side}."
 
 
 def _none_missing_words(case, chosen):
-    """That nothing misses, and how well that is known."""
+    """The missing length with its standard error, in words, where the verdict has none."""
     common = _common(case, chosen)
     if common is None:
-        return "These rows are too few to tell whether a length misses."
+        return "These rows are too few to determine a missing length."
     value, error = _first_missing(common)
     if not np.isfinite(error):
-        return "These rows do not tell whether a length misses."
-    return f"No length misses: a common one would be {value:.1f} +- {error:.1f} mm."
+        return "These rows do not determine a missing length."
+    return f"No missing length: the estimate of a common one is {value:.1f} +- {error:.1f} mm."
 
 
 def _size_mm(fit):

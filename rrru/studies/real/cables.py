@@ -1,4 +1,4 @@
-"""Cable robots whose drums turn by known angles and whose platform a camera sees: drum radii, anchors, start lengths.
+"""Cable robots with measured drum angles and platform positions from a camera: radii, anchors, start lengths.
 
 A set of `real: sets:`
 
@@ -14,9 +14,9 @@ A set of `real: sets:`
       unit: m    # of the position: mm (default), m, inch
       row: pose    # column that numbers the rows; absent: row, or from 1
 
-A cable is its length at the drum's zero plus radius times angle; it is also the sum of the distances that it runs. The
-camera's frame is the anchors'. Its places count as exact. A camera that sees everything larger by a factor acts as
-radii larger by this factor: lengths do not tell the two apart.
+The length of a cable is its length at the drum's zero plus radius times angle; it equals the sum of the distances along
+its route. Anchors are in the camera's frame. The camera's places count as exact. A scale error of the camera is
+confounded with a common factor of the radii.
 """
 
 import numpy as np
@@ -24,15 +24,15 @@ import pandas as pd
 
 from rrru.estimation.observations.lengths import Lengths
 from rrru.studies.real import length_tables
-from rrru.studies.real.length_laws import UNEXPLAINED, LengthCase, ways_of
+from rrru.studies.real.length_laws import UNEXPLAINED, LengthCase, variants_of
 from rrru.studies.real.lengths_section import MM, RAD, Section, held_out, numbers, row_numbers
 
 RADIUS = "drum_radius"
 _NEEDED = ("kind", "files", "drums", "anchors", "distances", "position")
 _OPTIONAL = ("angle_unit", "unit", "heights_mm", "row")
-# ASSUME radii are good to 4 %, 1 sigma; a camera scale, or cable as thick as not counted, changes all by one factor
+# ASSUME radii have errors of 4 %, 1 sigma; camera scale and cable thickness change all by one factor
 _RADIUS_SHARE, _COMMON, _SINGLE, _EACH = 0.04, 0.2, 0.15, 0.15
-# places to start anchors from, so many spans of the seen places off their middle at most
+# number of random starts of the anchors, their largest distance from the centre in spans of the measured places, seed
 _STARTS, _FAR, _SEED = 30, 6.0, 1
 
 
@@ -40,14 +40,14 @@ def study(frame, section, name):
     """Tables of one calibration: real_verdicts, real_steps, real_parameters, real_points.
 
     frame: one row per pose; section: as above; name: of the set, for messages. Raises ConfigError and IngestError for
-    what is no such set, FitError where the poses tell no machine.
+    an invalid set, FitError where the poses do not determine the machine.
     """
     read = Section(section, name, _NEEDED, _OPTIONAL)
     case, drums, anchors = cable_case(frame, read)
     verdict = case.verdict()
     chosen = verdict[2]
-    laws = case.laws[RADIUS]
-    chain = list(dict.fromkeys([(), (laws[0],), (laws[-1],), chosen.laws]))
+    effect_models = case.laws[RADIUS]
+    chain = list(dict.fromkeys([(), (effect_models[0],), (effect_models[-1],), chosen.laws]))
     steps, errors = length_tables.steps(case, chain, held_out(frame, read))
     notes, where, next_runs, rivals = _words(case, verdict, drums)
     row = length_tables.verdict_row(case, verdict, errors, where=where, confusable_with=rivals, next_runs=next_runs)
@@ -85,26 +85,26 @@ def cable_case(frame, read):
 
 
 def _check_lengths(read, columns, taken_mm, routing, places):
-    """Raise ConfigError where drums take up more cable than the ways between the places can ask for.
+    """Raise ConfigError where drums wind more cable than the displacements of the platform allow.
 
-    From one row to another a distance to an anchor changes by the way at most; columns: of the drums' angles; taken_mm
-    (N, k): radius times angle.
+    Between two rows the distance to an anchor changes at most by the displacement. columns: of the drums' angles;
+    taken_mm (N, k): radius times angle.
     """
     first, second = np.triu_indices(len(places), 1)
     way = np.linalg.norm(places[first] - places[second], axis=1)
     taken = np.abs(taken_mm[first] - taken_mm[second])[way > 0.0] / way[way > 0.0, None]
-    # bad rows are left to the fit
+    # the median ignores bad rows, which the fit rejects
     times = np.median(taken, axis=0) / routing.sum(axis=1)
     worst = int(times.argmax())
     if times[worst] > 1.0:
-        value = f"{read.given('angle_unit', 'rad')}, {columns[worst]} takes up {times[worst]:.3g} times"
+        value = f"{read.given('angle_unit', 'rad')}, {columns[worst]} winds {times[worst]:.3g} times"
         read.refuse(
-            "angle_unit", value, "what the platform's way can ask for: unit of the angles, of the places, radius"
+            "angle_unit", value, "at most the cable for the platform's displacements; check angle_unit, unit, radius_mm"
         )
 
 
 def _routing(read, drums, anchors):
-    """Matrix (k, n) of how often a cable runs to an anchor."""
+    """Matrix (k, n): how often each cable runs to each anchor."""
     rows = read.given("distances")
     shaped = isinstance(rows, list) and len(rows) == len(drums)
     if not shaped or not all(isinstance(row, list) and len(row) == len(anchors) for row in rows):
@@ -112,27 +112,27 @@ def _routing(read, drums, anchors):
     routing = np.array([[read.number("distances", value, 0.0) for value in row] for row in rows])
     for drum, row in zip(drums, routing, strict=True):
         if not row.any():
-            read.refuse("distances", row.tolist(), f"a distance at least for the cable of {drum}")
+            read.refuse("distances", row.tolist(), f"at least one distance for the cable of {drum}")
     for anchor, column in zip(anchors, routing.T, strict=True):
         if not column.any():
-            read.refuse("distances", column.tolist(), f"a cable at least that runs to {anchor}")
+            read.refuse("distances", column.tolist(), f"at least one cable that runs to {anchor}")
     return routing
 
 
 def _radii(bare, drums, radii):
-    """Ways of radii to be off: all by one factor, one drum, each drum its own."""
+    """Variants of radius errors: a common factor, one drum, one per drum."""
     factors = np.eye(len(bare.origin))[:, -len(drums) :]
-    told = [
+    variants = [
         ("all drums by one factor", "a common factor of the radii", factors @ radii[:, None] / radii.mean(), _COMMON)
     ]
-    told += [(drum, f"the radius of {drum}", factors[:, [k]], _SINGLE / len(drums)) for k, drum in enumerate(drums)]
-    told += [(", ".join(drums), "a radius per drum", factors, _EACH)]
-    reach = _RADIUS_SHARE * radii.mean()
-    return ways_of(RADIUS, told, lambda columns: np.full(columns.shape[1], reach))
+    variants += [(drum, f"the radius of {drum}", factors[:, [k]], _SINGLE / len(drums)) for k, drum in enumerate(drums)]
+    variants += [(", ".join(drums), "a radius per drum", factors, _EACH)]
+    prior_sd = _RADIUS_SHARE * radii.mean()
+    return variants_of(RADIUS, variants, lambda columns: np.full(columns.shape[1], prior_sd))
 
 
 def _starts(lengths):
-    """Values (p,) to start from: anchors anywhere about the seen places, start lengths as these ask."""
+    """Start values (p,): random anchors about the measured places, with start lengths that fit them."""
     generator, inverse = np.random.default_rng(_SEED), np.linalg.pinv(lengths.basis)
     middle, span = lengths.places_mm.mean(axis=0), np.ptp(lengths.places_mm, axis=0).max()
     readings, count = lengths.routing.shape
@@ -145,7 +145,7 @@ def _starts(lengths):
 
 
 def _parameters(case, chosen, drums, anchors):
-    """Rows of real_parameters: anchors and start lengths under the verdict's laws, radii each free."""
+    """Rows of real_parameters: anchors and start lengths of the verdict's Hypothesis, radii with each one free."""
     fit = chosen.fit
     parameter, start = length_tables.parameter, fit.lengths.machine(fit.values)[1]
     start_errors = fit.lengths.split(chosen.standard_errors)[1]
@@ -167,35 +167,37 @@ def _parameters(case, chosen, drums, anchors):
 
 
 def _words(case, verdict, drums):
-    """Notes (sentences), where, next_runs and what is confusable, of a verdict."""
+    """Notes (sentences), where, next_runs and confounded effects of a verdict."""
     effects, _, chosen = verdict
     possible, poses = case.laws[RADIUS], len(case.used)
-    off = case.probability_of(lambda laws: bool(laws))
+    off = case.probability_of(lambda effect_models: bool(effect_models))
     notes, where, rivals, runs = [], "", [], []
     if RADIUS in effects:
-        law = chosen.laws[0]
-        settled = case.probability_of(lambda laws: law in laws) > 0.9 * off
-        where = law.where if settled else ""
+        effect_model = chosen.laws[0]
+        settled = case.probability_of(lambda effect_models: effect_model in effect_models) > 0.9 * off
+        where = effect_model.where if settled else ""
         changed = chosen.fit.lengths.machine(chosen.fit.values)[2] - case.bare.origin[-len(drums) :]
         error = chosen.fit.lengths.split(chosen.standard_errors)[2]
         said = [f"{drums[k]} by {changed[k]:+.2f} +- {error[k]:.2f} mm" for k in np.flatnonzero(error > 0.0)]
-        notes.append(f"The radii are off, likeliest {', '.join(said)}.")
+        notes.append(f"The radii have errors, most probably {', '.join(said)}.")
         if not settled:
             named = [
-                way.adds for way in possible if case.probability_of(lambda laws, way=way: way in laws) > 0.05 * off
+                way.adds
+                for way in possible
+                if case.probability_of(lambda effect_models, way=way: way in effect_models) > 0.05 * off
             ]
-            notes.append(f"{poses} poses do not settle which radius is off (possible: {'; '.join(named)}).")
+            notes.append(f"{poses} poses do not determine which radius has an error (possible: {'; '.join(named)}).")
             rivals += named
-            runs.append("the cable that ten turns of each drum take up, by a tape")
-        if case.probability_of(lambda laws: possible[0] in laws) > 0.05 * off:
+            runs.append("the cable length of ten turns of each drum, by a tape")
+        if case.probability_of(lambda effect_models: possible[0] in effect_models) > 0.05 * off:
             rivals.append("camera_scale")
-            runs.append("a rule of known length before the camera")
+            runs.append("a ruler of known length in the camera image")
     else:
-        notes.append(f"No radius is shown to be off; that one is has probability {off:.2f}.")
+        notes.append(f"No radius error is shown; the probability of one is {off:.2f}.")
         if off > 0.1:
             rivals.append(RADIUS)
-            runs.append("the cable that ten turns of each drum take up, by a tape")
+            runs.append("the cable length of ten turns of each drum, by a tape")
     notes.append("A scale error of the camera would act as a common factor of the radii.")
     if UNEXPLAINED in effects:
-        notes.append(f"{chosen.smooth_mm:.1f} mm are left that follow the place smoothly, by no law here.")
+        notes.append(f"No effect model explains a smooth residual of {chosen.smooth_mm:.1f} mm that follows the place.")
     return notes, where, "; ".join(runs), ", ".join(dict.fromkeys(rivals))

@@ -1,6 +1,6 @@
-"""What the model of one series leaves of another one of the same robot, with nothing but the frames fitted anew.
+"""Residuals of the model of one series on another series of the same robot, with only the frames fitted again.
 
-Series are studied apart from each other: `told` is what has to be known of each, in numbers and texts alone.
+Series are studied separately: `saved_values` gives the numbers and texts that `model` needs of each.
 """
 
 from collections.abc import Mapping, Sequence
@@ -33,11 +33,11 @@ _COLUMNS = ("campaign", "carried_from", "frames_rms_mm", "geometry_rms_mm", "cau
 
 @dataclass(frozen=True)
 class Model:
-    """A studied series as far as it carries: its measurements and robot, and the numbers found.
+    """The model of a studied series for transfer: its measurements, robot and estimates.
 
     arm_mm: of orientations, NaN where none were read; noise_mm: per axis; geometry (p,), deviations (p,): of the
-    calibration alone and beside the causes; effects: these by name, with values by parameter;
-    weight: what it is off by, which these were found with.
+    calibration alone and together with the causes; effects: these by name, with values by parameter;
+    weight: estimated errors of payload and tilt.
     """
 
     series: Series
@@ -51,8 +51,8 @@ class Model:
     weight: Mapping[str, float]
 
 
-def told(studied: Studied) -> dict[str, Any]:
-    """What `model` has to be told of a studied series, beside its measurements."""
+def saved_values(studied: Studied) -> dict[str, Any]:
+    """The values of a studied series that `model` needs in addition to its measurements."""
     case, state = studied.case, studied.state
     effects = {}
     for key, coordinates in state.effects.items():
@@ -77,12 +77,12 @@ def model(
     robots: Mapping[str, Any],
     settings: GapSettings,
 ) -> Model:
-    """The Model of a series that `told` has told the numbers of."""
+    """The Model of a series from the numbers of `saved_values`."""
     robot = setup.measured_robot(nominal_robot(series, robots), measurements)
     library, effects = settings.library(robot), {}
-    for name, one in numbers["effects"].items():
-        effect = library[name].with_waves(one["waves"]) if one["waves"] else library[name]
-        effects[name] = effect, np.array(one["values"])
+    for name, saved in numbers["effects"].items():
+        effect = library[name].with_waves(saved["waves"]) if saved["waves"] else library[name]
+        effects[name] = effect, np.array(saved["values"])
     deviations = (np.array(numbers[key]) for key in ("geometry", "deviations"))
     return Model(
         series, measurements, robot, numbers["arm_mm"], numbers["noise_mm"], *deviations, effects, numbers["weight"]
@@ -100,11 +100,11 @@ def _row(first: Model, second: Model) -> dict:
     robot = sim(first.robot)
     arm_mm = second.arm_mm if rows.has_turns(second.measurements) else np.nan
     case = make_case(second.measurements, robot, NO_MASSES, second.noise_mm, {}, True, arm_mm)
-    laws = {
+    effects = {
         name: replace(effect, coordinates=plain_coordinates(effect.parameters, 1.0))
         for name, (effect, _) in first.effects.items()
     }
-    case = replace(case, library=laws | {FRAMES: frames(robot)})
+    case = replace(case, library=effects | {FRAMES: frames(robot)})
     values = {(name, 0): values for name, (_, values) in first.effects.items()}
     models = {
         "frames_rms_mm": State(0.0 * first.geometry, {}),
@@ -116,7 +116,7 @@ def _row(first: Model, second: Model) -> dict:
 
 
 def _left_mm(case: Case, state: State) -> float:
-    """Rms that a state with frames of its own leaves on the rows held out, NaN where these are not found."""
+    """Held-out rms of a state with its frames fitted again, NaN where that fit fails."""
     try:
         return rms(held_out_mm(case, fit_frames(case, state)))
     except FitError:

@@ -1,8 +1,8 @@
-"""Robots and sheets of data sets that describe their chains in a file of their own: elastic torsos with two arms.
+"""Robots and sheets of data sets with a file that describes the kinematic chain: elastic torsos with two arms.
 
 A chain's file has DH rows after Craig in m and rad for the trunk and each arm, fixed frames as matrices (4, 4) between
-them, masses, and in `torso_q` the joints' values in words, "-(q_torso1 + q_torso2)" for one that follows others. A
-robot is an entry of `robots:` for `rrru.robots.catalogue.make_mechanism`. Lengths in mm, angles in degrees there.
+them, masses, and in `torso_q` the joint values as text: "-(q_torso1 + q_torso2)" for one that follows others. A robot
+is an entry of `robots:` for `rrru.robots.catalogue.make_mechanism`. Lengths in mm, angles in degrees.
 """
 
 import re
@@ -13,47 +13,49 @@ from scipy.spatial.transform import Rotation
 
 from rrru.errors import ConfigError
 
-HANDS = ("right", "left")
-# files state no ranges of joints; home poses and workspaces are looked for in these
+END_EFFECTORS = ("right", "left")
+# joint ranges for the search of home poses and workspaces; the files state none
 _RANGE_DEG = [-180.0, 180.0]
 
 
 def robot_section(chain, follows=True):
-    """The `robots:` entry of a chain's mapping, the columns of its drives those of the data set's file.
+    """The `robots:` entry of a chain's mapping; the columns of its drives are those of the data set's file.
 
-    follows: whether a joint that follows others passes its load on to them, as rods do; else it is a drive of its own,
-    whose values `sheet` adds.
+    follows: whether a joint that follows others transmits its load to them, as rods do; otherwise it is a separate
+    drive, whose values `sheet` adds.
     """
     masses = chain["masses"]
     trunk = [_frame(chain["base_to_torso"])]
     for number, (row, mass) in enumerate(zip(chain["torso"], masses["torso"], strict=True)):
         name, drives = _joint(chain, number)
-        own = {"name": name, "drives": drives} if drives and follows else {"name": name, "range_deg": _RANGE_DEG}
-        trunk.append(own | _row(row, mass))
-    head = _after(chain)
+        joint = {"name": name, "drives": drives} if drives and follows else {"name": name, "range_deg": _RANGE_DEG}
+        trunk.append(joint | _row(row, mass))
+    head = _head_centre(chain)
     trunk.append({"xyz_mm": [0.0, 0.0, 0.0], "mass_kg": masses["head"]["mass_kg"], "com_mm": head.tolist()})
-    hands = {}
-    for hand in HANDS:
+    end_effectors = {}
+    for hand in END_EFFECTORS:
         links = zip(chain[hand], masses[hand], strict=True)
         rows = [
             {"name": f"q_{hand}{k}", "range_deg": _RANGE_DEG} | _row(row, mass) for k, (row, mass) in enumerate(links)
         ]
         last = _frame(chain["wrist_to_hand"]) | _mass(masses["hand"])
-        hands[hand] = [_frame(chain[f"torso_to_{hand}"]), *rows, last]
-    return {"dh": trunk, "hands": hands, "convention": "modified"}
+        end_effectors[hand] = [_frame(chain[f"torso_to_{hand}"]), *rows, last]
+    return {"dh": trunk, "hands": end_effectors, "convention": "modified"}
 
 
 def sheet(chain, frame):
-    """One row per hand and pose of a data set's table (n), with columns as ingest knows them, positions in m."""
+    """One row per end effector and pose of a data set's table (n), with the columns of ingest, positions in m."""
     joints = [_joint(chain, number) for number in range(len(chain["torso"]))]
-    joints += [(f"q_{hand}{k}", {}) for hand in HANDS for k in range(len(chain[hand]))]
-    followed = {name: sum(by * frame[f"{drive}_rad"] for drive, by in of.items()) for name, of in joints if of}
+    joints += [(f"q_{hand}{k}", {}) for hand in END_EFFECTORS for k in range(len(chain[hand]))]
+    followed = {
+        name: sum(by * frame[f"{drive}_rad"] for drive, by in factors.items()) for name, factors in joints if factors
+    }
     frame = frame.assign(**{f"{name}_rad": values for name, values in followed.items()})
     drives, parts = [f"{name}_rad" for name, _ in joints], []
-    for hand in HANDS:
-        own = frame[["row", "held_out", *drives]].assign(trajectory="poses", target=hand)
+    for hand in END_EFFECTORS:
+        poses = frame[["row", "held_out", *drives]].assign(trajectory="poses", target=hand)
         read = {f"measured_{axis}_mm": frame[f"{hand}_{axis}_m"] for axis in "xyz"}
-        parts.append(own.assign(**read))
+        parts.append(poses.assign(**read))
     return pd.concat(parts).sort_values("row", kind="stable").reset_index(drop=True)
 
 
@@ -77,21 +79,21 @@ def _row(row, mass):
 
 
 def _joint(chain, number):
-    """Name of a joint of the trunk, and of one that follows others the factors by drive of its value in words.
+    """Name of a joint of the trunk, and the factors by drive of one that follows others.
 
-    Raises ConfigError for words that are neither a drive nor minus a sum of drives in brackets.
+    Raises ConfigError for a value that is neither a drive nor minus a sum of drives in brackets.
     """
     value = chain["torso_q"][number]
     if value.isidentifier():
         return value, {}
     found = re.fullmatch(r"-\((\w+(?: \+ \w+)*)\)", value)
     if not found:
-        raise ConfigError(f"chain: a joint's value is {value!r}; allowed: a drive, or -(one + other)")
+        raise ConfigError(f"chain: torso_q has {value!r}; allowed: a drive, or -(drive1 + drive2)")
     return f"q_follows{number}", dict.fromkeys(found[1].split(" + "), -1.0)
 
 
-def _after(chain):
-    """Centre (3,) of the head's mass in mm in the trunk's last frame, both head joints at zero."""
+def _head_centre(chain):
+    """Centre of mass (3,) of the head in mm in the trunk's last frame, both head joints at zero."""
     here = np.asarray(chain["torso_to_head"], dtype=float)
     for row in chain["head"]:
         tilt, turn = (Rotation.from_euler(*one).as_matrix() for one in (("x", row["alpha"]), ("z", row["theta0"])))

@@ -1,4 +1,4 @@
-"""Figures of real arms: model after model with the budget of the gap, and the waves of every joint."""
+"""Figures of real arms: models step by step with the budget of the gap, and the waves of every joint."""
 
 from textwrap import fill
 
@@ -10,24 +10,24 @@ from rrru.figures import style
 _OURS = {"color": style.BLUE, "marker": "s"}
 _OTHERS = {"color": style.VERMILION, "marker": "D", "markerfacecolor": "white", "linestyle": "none"}
 _KINDS = {"effect": style.BLUE, "unexplained": style.VERMILION}
-# a row of panels, a joint's panel where there are few and where there are many, and from how many on
+# heights of a row, of a joint's panel where there are few and where there are many; least number of many
 _ROW_MM, _JOINT_MM, _LOW_MM, _MANY = 56.0, 36.0, 24.0, 8
-# characters in a line of a title over a panel, by panels beside each other
+# characters in a line of a panel's title, by number of panels in a row
 _LINE = {1: 110, 2: 54, 3: 34}
 _LEAST = 0.005
-NOTHING = "no file of this set is here, or none that can be used"
+NOTHING = "no usable file of this set was found"
 _MICRORAD = 1e6
 
 
 @style.printed
 def steps(tables, options):
-    """Real robot, a row per series. Left: what model after model leaves on rows no fit has seen, ours, others' fits
-    of the same model, and last the model of the named causes. a: frames, b: + geometry, c: + compliance of the drives,
-    c2: across the joints, c3: of a trunk, d: + two harmonics of the drives, e: + drift of the base. Right: what the gap
-    is made of, with 95 % intervals; parts that take from each other add up to more than all of it.
+    """Real robot, a row per series. Left: held-out residuals of the models, our fits, published fits of the same
+    models, and last the model of the named causes. a: frames, b: + geometry, c: + compliance of the drives, c2: across
+    the joints, c3: of a trunk, d: + two harmonics of the drives, e: + drift of the base. Right: budget of the gap, with
+    95 % intervals; correlated parts may sum to more than the whole gap.
     """
     verdicts, models, budget = (tables[name] for name in ("real_verdicts", "real_steps", "real_budget"))
-    # of those that are refused there is nothing to draw
+    # refused series have nothing to draw
     verdicts = verdicts[verdicts["campaign"].isin(models["campaign"])]
     if verdicts.empty:
         return style.note(f"{options['set']}: {NOTHING}")
@@ -36,19 +36,19 @@ def steps(tables, options):
     for row, (left, right) in zip(verdicts.to_dict("records"), panels, strict=True):
         _draw_models(left, models[models["campaign"] == row["campaign"]], row)
         _draw_budget(right, budget[budget["campaign"] == row["campaign"]])
-        told = row["effects"].replace("_", " ").replace("+", " + ")
-        told += f", p = {row['probability']:.2f}" if np.isfinite(row["probability"]) else ""
-        left.set_title(f"{row['campaign']}\n{fill(told, _LINE[2])}", fontsize=7.0)
+        verdict = row["effects"].replace("_", " ").replace("+", " + ")
+        verdict += f", p = {row['probability']:.2f}" if np.isfinite(row["probability"]) else ""
+        left.set_title(f"{row['campaign']}\n{fill(verdict, _LINE[2])}", fontsize=7.0)
     return figure
 
 
 def _draw_models(axes, own, row):
-    """Rms on the held-out rows of model after model."""
+    """Held-out rms of the models."""
     axes.plot(own["model"], own["held_out_rms_mm"], label="held-out rows", **_OURS)
     known = {model: row[f"reference_{model}_rms_mm"] for model in "abcde"}
     known = {model: value for model, value in known.items() if np.isfinite(value) and model in set(own["model"])}
     if known:
-        axes.plot([*known], [*known.values()], label="others' fit", **_OTHERS)
+        axes.plot([*known], [*known.values()], label="published fit", **_OTHERS)
     axes.set(yscale="log", ylabel="rms (mm)", xlabel="model")
     axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 3.0, 5.0, 7.0)))
     style.plain_log(axes.yaxis)
@@ -70,7 +70,7 @@ def _draw_budget(axes, rows):
     low, high = (100.0 * shown[name] for name in ("share_low", "share_high"))
     axes.hlines(places, low.clip(lower=0.0), high, color=style.BLACK, linewidth=0.7)
     axes.set_yticks(places, names)
-    # bars of one or two parts are no thicker, and on top
+    # keeps the thickness of bars for one or two parts, at the top
     axes.set_ylim(min(len(shown) - 3, 0) - 0.6, len(shown) - 0.4)
     axes.set_xlim(left=0.0)
     axes.set(xlabel="share of the gap's mean square (%)")
@@ -79,9 +79,9 @@ def _draw_budget(axes, rows):
 
 @style.printed
 def spectrum(tables, options):
-    """Waves of every joint's angle in a real arm, a column per series: amplitude of the one wave that fits what is left
-    beside the calibrated model (before) and beside that of the named causes (after). Bars: what the error function of
-    the joint was found to hold. Orders that are nearer than the resolution cannot be told apart.
+    """Waves of every joint's angle in a real arm, a column per series: amplitude of a single wave fitted to the
+    residuals of the calibrated model (before) and of the model of the named causes (after). Bars: estimated error
+    function of the joint. Orders closer than the resolution are not distinguishable.
     """
     waves = tables["real_spectrum"]
     if waves.empty:

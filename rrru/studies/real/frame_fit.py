@@ -1,4 +1,4 @@
-"""Fits of where robot, tool and targets are, while the rest of a model stays. Lengths in mm, angles in rad."""
+"""Fits of the placements of robot, tool and targets with the other parameters fixed. Lengths in mm, angles in rad."""
 
 from collections.abc import Sequence
 from contextlib import suppress
@@ -27,28 +27,30 @@ from rrru.parameters import Parameter, ParameterSet
 FloatArray = npt.NDArray[np.float64]
 
 FRAMES = "frames"
-# prior standard deviation: an instrument stands within ten metres of the robot
+# prior s.d.: an instrument is within ten metres of the robot
 _INSTRUMENT_SD_MM = 1e4
 
 
 def frames(robot: Robot) -> Effect:
-    """Where robot, tool and reflectors lie, as far as a campaign leaves it open: one coordinate a number."""
+    """Placements of robot, tool and reflectors that a campaign does not fix, one coordinate per parameter."""
     numbers = open_numbers(robot.reads)
     limits = {"mm": _INSTRUMENT_SD_MM, "rad": np.pi}
-    bounds = ((one, limits[one.unit]) for one in numbers)
-    parameters = ParameterSet(tuple(Parameter(one.name, one.unit, 0.0, -most, most, "free") for one, most in bounds))
+    bounds = ((number, limits[number.unit]) for number in numbers)
+    parameters = ParameterSet(
+        tuple(Parameter(number.name, number.unit, 0.0, -limit, limit, "free") for number, limit in bounds)
+    )
     directions = frame_directions(robot)
-    typical = [1.0 if one.unit == "mm" else 1e-3 for one in numbers]
+    typical = [1.0 if number.unit == "mm" else 1e-3 for number in numbers]
 
     def place(_motion, values):
-        """The constant twists that the numbers make."""
+        """The constant twists of the parameters."""
         return Contribution((directions @ values)[None])
 
     return Effect(FRAMES, parameters, plain_coordinates(parameters, typical), place)
 
 
 def frame_directions(robot: Robot) -> FloatArray:
-    """Twists (sites, 6, c) of a unit of each coordinate of `frames`."""
+    """Twists (sites, 6, c) per unit of each coordinate of `frames`."""
     return np.stack([direction(robot.legs, one) for one in open_numbers(robot.reads)], axis=-1)
 
 
@@ -78,10 +80,10 @@ class FrameObservations:
 
 
 def fit_frames(case: Case, state: State) -> State:
-    """A state with frames fitted to the used points of a case whose library has `frames`; all else of it stays.
+    """A state with frames fitted to the used points of a case whose library has `frames`; all else stays fixed.
 
-    The search starts at the closed-form registration, so that no turn of the instrument is too large. Raises FitError
-    where it does not converge, naming the parameters that the readings do not determine.
+    The search starts at the closed-form registration, so that any rotation of the instrument is allowed. Raises
+    FitError where it does not converge, naming the parameters that the readings do not determine.
     """
     numbers = open_numbers(case.mechanism.reads)
     observations = FrameObservations(case, state, frame_directions(case.mechanism))
@@ -99,7 +101,7 @@ def _start(observations: FrameObservations, numbers: Sequence[Candidate]) -> Flo
     case, nothing = observations.case, np.zeros(len(numbers))
     if case.mechanism.reads.frame:
         poses, twists = case.posed(observations.state_at(nothing))
-        # those of effects differ from row to row; a start may take their mean
+        # twists of effects differ from row to row; their mean is good enough for a start
         twists = (twists[case.used] if len(twists) > 1 else twists).mean(axis=0, keepdims=True)
         readings = case.readings or Readings(rows.measured(case.measurements))
         with suppress(FitError):

@@ -1,8 +1,8 @@
-"""Machines of which lengths are known: which laws beside the frame their readings speak for.
+"""Machines with measured lengths: Bayesian selection of effect models in addition to the frame.
 
-Each law may act or not; every combination is fitted and weighed by its evidence, with independent noise alone and with
-a smooth discrepancy that no law explains (`rrru.estimation.evidence`). Neighbouring rows err alike wherever a law is
-lacking; F tests or BIC, which count them as independent, then find whatever term resembles the discrepancy.
+Each effect model may act or not. Every combination is fitted and weighted by its evidence, with independent noise alone
+and with a smooth discrepancy (`rrru.estimation.evidence`). Errors of neighbouring rows are correlated wherever an
+effect model is missing. F tests or BIC count them as independent and select any term that resembles the discrepancy.
 """
 
 from collections.abc import Callable
@@ -20,24 +20,24 @@ from rrru.estimation.observations.lengths import Lengths
 from rrru.estimation.parameters import Block, Parameters
 
 UNEXPLAINED = "unexplained"
-# starts beside the fit that judged the readings; readings that a law's fit leaves free at least
+# starts in addition to the fit that judged the readings; least redundancy of a fit with an effect model
 _STARTS, _FREEDOM = 3, 3
-# rows are predicted from the others in so many parts of every tenth row
+# folds of a cross-validation over every tenth row; largest number of rows for leave-one-out
 _FOLDS, _FEW = 10, 20
-# readings that the others of their row check by a smaller share of their variance are not predicted
+# readings with a smaller share of their variance checked by the others of their row are not predicted
 _MIN_CHECKED = 0.02
-# standard deviations from which a reading is named
+# least residual, in standard deviations, of a reading that is named
 _STANDS_OUT = 5.0
-# probability from which a smooth error is named, and the logarithm of its odds
+# least probability of a smooth error that is named, and the logarithm of its odds
 _SURE, _ODDS = 0.9, np.log(9.0)
 
 
 @dataclass(frozen=True, eq=False)
-class Law:
-    """One way for a law to act: effect, where in words, what it adds in words.
+class EffectModel:
+    """One variant of an effect: effect, where it acts and what it adds in words.
 
-    columns (n d + 2 k, c): what its parameters (c,) change of the machine's numbers; ranges (c,): their prior standard
-    deviations. believed: prior probability of acting this way.
+    columns (n d + 2 k, c): derivatives of the machine's numbers by its parameters (c,); ranges (c,): their prior s.d.;
+    believed: prior probability of this variant.
     """
 
     effect: str
@@ -56,7 +56,7 @@ class Law:
 
 @dataclass(frozen=True)
 class Hypothesis:
-    """A combination of laws, its fit, and its marginal likelihoods: None where the readings do not determine it.
+    """A combination of effect models, its fit, and its marginal likelihoods: None where it is not identifiable.
 
     independent: with noise alone; smooth: with noise and a smooth discrepancy.
     """
@@ -68,12 +68,12 @@ class Hypothesis:
 
     @property
     def effects(self):
-        """Names of the effects of its laws."""
-        return tuple(law.effect for law in self.laws)
+        """Names of the effects of its effect models."""
+        return tuple(effect_model.effect for effect_model in self.laws)
 
     @property
-    def alike(self):
-        """Whether neighbouring rows err alike: whether a smooth discrepancy is all but sure."""
+    def correlated(self):
+        """Whether errors of neighbouring rows are correlated: the odds of a smooth discrepancy exceed 9."""
         return self.smooth is not None and self.smooth.log_evidence - self.independent.log_evidence > _ODDS
 
     @property
@@ -88,14 +88,14 @@ class Hypothesis:
 
     @property
     def standard_errors(self):
-        """Of the machine's numbers as `LengthFit` has them, under a smooth discrepancy where neighbours err alike."""
-        if not self.alike:
+        """Standard errors of the machine's numbers, with a smooth discrepancy where errors are correlated."""
+        if not self.correlated:
             return self.fit.standard_errors
         half = self.fit.lengths.basis @ self.smooth.covariance
         return np.sqrt((half * self.fit.lengths.basis).sum(axis=1))
 
     def logs(self):
-        """Log evidence without and with a smooth discrepancy, each half as probable before; (2,)."""
+        """Log evidence (2,) without and with a smooth discrepancy, each with prior probability 0.5."""
         if self.smooth is None:
             return np.full(2, -np.inf)
         return np.array([self.independent.log_evidence, self.smooth.log_evidence]) + np.log(0.5)
@@ -103,31 +103,31 @@ class Hypothesis:
 
 @dataclass(frozen=True)
 class LengthCase:
-    """What a set of lengths is fitted with.
+    """Model selection problem of a set of lengths.
 
-    bare: Lengths of the frame without any law. laws: {effect: Laws}, at most one of each effect acts. starts: function
-    of Lengths that yields values (p,) to start from.
+    bare: Lengths of the frame without effect models. laws: {effect: EffectModels}, of which at most one per effect
+    acts. starts: function of Lengths that yields start values (p,).
     """
 
     bare: Lengths
     laws: dict
     starts: Callable
 
-    def model(self, laws):
-        """The Lengths under some laws."""
-        columns = [self.bare.basis, *(law.columns for law in laws)]
+    def model(self, effect_models):
+        """The Lengths with some effect models."""
+        columns = [self.bare.basis, *(effect_model.columns for effect_model in effect_models)]
         return replace(self.bare, basis=np.concatenate(columns, axis=1))
 
-    def parameters(self, laws):
-        """The Parameters under some laws: flat priors of the frame's, which all combinations share."""
+    def parameters(self, effect_models):
+        """The Parameters with some effect models; those of the frame, common to all combinations, have flat priors."""
         names = [f"frame_{number}" for number in range(self.bare.basis.shape[1])]
         frame = Block.of("frame", names, [Lengths.unit] * len(names), np.inf)
-        return Parameters((frame, *(law.block for law in laws)))
+        return Parameters((frame, *(effect_model.block for effect_model in effect_models)))
 
     @cached_property
     def _judged(self):
-        """The fit under all laws, with most parameters that the readings tell, that judges the readings."""
-        largest = [max(ways, key=lambda law: len(law.ranges)) for ways in self.laws.values()]
+        """The fit that judges the readings: with as many effect models as the readings determine."""
+        largest = [max(ways, key=lambda effect_model: len(effect_model.ranges)) for ways in self.laws.values()]
         for count in range(len(largest), -1, -1):
             model = self.model(largest[:count])
             if count and model.redundancy < model.basis.shape[1]:
@@ -143,79 +143,83 @@ class LengthCase:
 
     @property
     def suspect(self):
-        """Flags (N, k) of readings that stand out but not so far that they are left out."""
+        """Flags (N, k) of readings with large residuals that are still used."""
         return standing_out(self._judged, _STANDS_OUT) & self.used
 
-    def _fit(self, laws):
-        """The fit under some laws, begun from the fit under all and from a few of the starts."""
-        model, judged = self.model(laws), self._judged
+    def _fit(self, effect_models):
+        """The fit with some effect models, started from the judging fit and from a few of the starts."""
+        model, judged = self.model(effect_models), self._judged
         full = judged.lengths.origin + judged.lengths.basis @ judged.values
         near = np.linalg.pinv(model.basis) @ (full - model.origin)
         return fit_lengths(model, [near, *islice(self.starts(model), _STARTS)], self.used)
 
-    def _believed(self, laws):
-        """Probability of a combination before any reading."""
-        acting = {law.effect for law in laws}
-        rest = [1.0 - sum(law.believed for law in ways) for effect, ways in self.laws.items() if effect not in acting]
-        return float(np.prod([law.believed for law in laws]) * np.prod(rest))
+    def _prior(self, effect_models):
+        """Prior probability of a combination."""
+        acting = {effect_model.effect for effect_model in effect_models}
+        absent = [
+            1.0 - sum(effect_model.believed for effect_model in ways)
+            for effect, ways in self.laws.items()
+            if effect not in acting
+        ]
+        return float(np.prod([effect_model.believed for effect_model in effect_models]) * np.prod(absent))
 
     @cached_property
     def hypotheses(self):
-        """Every combination of laws that the readings are enough for, and its probabilities (h, 2).
+        """Every combination of effect models that the readings determine, and its probabilities (h, 2).
 
-        Columns of the probabilities: without and with a smooth error. What was not tried keeps what was believed of it.
-        Raises FitError where none can be fitted.
+        Columns of the probabilities: without and with a smooth error. Untested combinations keep their prior
+        probability. Raises FitError where none can be fitted.
         """
         combinations = [()]
         for ways in self.laws.values():
-            combinations += [(*laws, law) for laws in combinations for law in ways]
+            combinations += [(*effect_models, effect_model) for effect_models in combinations for effect_model in ways]
         found, logs, untried = [], [], 0.0
-        for laws in combinations:
-            if self.model(laws).redundancy < (_FREEDOM if laws else 1):
-                untried += self._believed(laws)
+        for effect_models in combinations:
+            if self.model(effect_models).redundancy < (_FREEDOM if effect_models else 1):
+                untried += self._prior(effect_models)
                 continue
-            fit = self._fit(laws)
-            found.append(Hypothesis(laws, fit, *fit.marginals(self.parameters(laws)) or (None, None)))
-            logs.append(found[-1].logs() + np.log(self._believed(laws)))
+            fit = self._fit(effect_models)
+            found.append(Hypothesis(effect_models, fit, *fit.marginals(self.parameters(effect_models)) or (None, None)))
+            logs.append(found[-1].logs() + np.log(self._prior(effect_models)))
         logs = np.array(logs).reshape(-1, 2)
         if not np.isfinite(logs).any():
-            raise FitError("the lengths do not tell the frame: they are too few or too much alike", found)
+            raise FitError("the lengths do not determine the frame: use more lengths, or places further apart", found)
         weights = np.exp(logs - logs.max())
         return tuple(found), (1.0 - untried) * weights / weights.sum()
 
     def verdict(self):
-        """Effects of the likeliest combination of effects, its probability, and the likeliest Hypothesis with them.
+        """Effects of the most probable combination, its probability, and the most probable Hypothesis with them.
 
-        UNEXPLAINED is among them, and the probability that of it too, where a smooth error beside is all but sure.
+        UNEXPLAINED is among them, and its probability included, where a smooth error has a probability above 0.9.
         """
         found, probability = self.hypotheses
         sums = {}
-        for one, row in zip(found, probability, strict=True):
-            sums[one.effects] = sums.get(one.effects, 0.0) + row
+        for hypothesis, row in zip(found, probability, strict=True):
+            sums[hypothesis.effects] = sums.get(hypothesis.effects, 0.0) + row
         effects = max(sums, key=lambda key: sums[key].sum())
-        alike = [number for number, one in enumerate(found) if one.effects == effects]
-        chosen = found[max(alike, key=lambda number: probability[number].sum())]
+        candidates = [number for number, hypothesis in enumerate(found) if hypothesis.effects == effects]
+        chosen = found[max(candidates, key=lambda number: probability[number].sum())]
         _, smooth = sums[effects]
         if smooth > _SURE * sums[effects].sum():
             return (*effects, UNEXPLAINED), float(smooth), chosen
         return effects, float(sums[effects].sum()), chosen
 
     def probability_of(self, asked):
-        """Probability of all combinations of which asked(laws) holds."""
+        """Total probability of the combinations for which asked(effect_models) is true."""
         found, probability = self.hypotheses
         return float(sum(row.sum() for one, row in zip(found, probability, strict=True) if asked(one.laws)))
 
-    def hypothesis(self, laws):
-        """The Hypothesis of some laws, None where it cannot be fitted."""
-        return next((one for one in self.hypotheses[0] if one.laws == tuple(laws)), None)
+    def hypothesis(self, effect_models):
+        """The Hypothesis of some effect models, None where it cannot be fitted."""
+        return next((one for one in self.hypotheses[0] if one.laws == tuple(effect_models)), None)
 
 
-def ways_of(effect, told, reach):
-    """Laws of an effect from (where, adds, columns, believed); reach(columns): how far its numbers may go, 1 sigma."""
-    laws = []
-    for where, adds, columns, believed in told:
-        laws.append(Law(effect, where, adds, columns, reach(columns), believed))
-    return tuple(laws)
+def variants_of(effect, variants, prior_sd):
+    """EffectModels of an effect from (where, adds, columns, prior probability); prior_sd(columns): of parameters."""
+    models = []
+    for where, adds, columns, probability in variants:
+        models.append(EffectModel(effect, where, adds, columns, prior_sd(columns), probability))
+    return tuple(models)
 
 
 def frame_columns(count, dimensions, readings):
@@ -225,11 +229,11 @@ def frame_columns(count, dimensions, readings):
 
 
 def predict_held_out(fit, held_out=None):
-    """Held-out errors (N, k) in mm: of every length as predicted by other rows and the other lengths of its row.
+    """Held-out errors (N, k) in mm of every length, predicted from other rows and the other lengths of its row.
 
-    Each over the root of the share of its variance that the others check, so that noise alone gives its own size; NaN
-    for readings left out and for those that nothing checks. Machines are fitted to every tenth row's complement, or
-    without one row where there are at most 20. held_out (N,): the rows to hold out where they are given.
+    Each is divided by the root of the share of its variance that the others check, so that pure noise keeps its own
+    size. NaN for rejected readings and for those without redundancy. The folds are every tenth row, or single rows
+    where there are at most 20. held_out (N,): the rows to hold out where they are given.
     """
     rows = len(fit.lengths)
     folds = np.arange(rows) % min(rows if rows <= _FEW else _FOLDS, rows)

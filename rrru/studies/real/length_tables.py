@@ -1,13 +1,13 @@
-"""Tables of machines of which lengths are known: real_steps, rows of real_verdicts and real_parameters, real_points."""
+"""Tables of machines with measured lengths: real_steps, rows of real_verdicts and real_parameters, real_points."""
 
 import numpy as np
 import pandas as pd
 
 from rrru.studies.real.length_laws import UNEXPLAINED, predict_held_out
 
-# rows that a note names
+# most rows that a note names
 _NAMED = 10
-# of the bootstrap of blocks of rows
+# draws, blocks and seed of the bootstrap over blocks of rows
 _DRAWS, _BLOCKS, _SEED = 1000, 20, 1
 
 
@@ -18,9 +18,9 @@ def parameter(name, unit, value, standard_error, nominal, note):
 
 
 def anchors(case, chosen, names, note):
-    """Rows of real_parameters of the anchors under the verdict's laws, and of those of the frame alone (bare_)."""
+    """Rows of real_parameters of the anchors with the verdict's effects, and of the frame alone (bare_)."""
     rows = []
-    for prefix, hypothesis, said in (("", chosen, note), ("bare_", case.hypothesis(()), "without any further law")):
+    for prefix, hypothesis, said in (("", chosen, note), ("bare_", case.hypothesis(()), "without effect models")):
         if hypothesis is None:
             continue
         fit = hypothesis.fit
@@ -34,39 +34,39 @@ def anchors(case, chosen, names, note):
 
 
 def steps(case, chain, held_out):
-    """Table real_steps of a chain of laws, and the errors (N, k) of each as the other rows predict them.
+    """Table real_steps of a chain of combinations of effect models, and the held-out errors (N, k) of each.
 
-    Held-out columns: as `predict_held_out` says, one value per reading.
+    Held-out columns: from `predict_held_out`, one value per reading.
     """
     rows, errors = [], {}
-    for laws in chain:
-        hypothesis = case.hypothesis(laws)
+    for effect_models in chain:
+        hypothesis = case.hypothesis(effect_models)
         if hypothesis is None:
             continue
         fit = hypothesis.fit
-        errors[tuple(laws)] = wrong = predict_held_out(fit, held_out)
+        errors[tuple(effect_models)] = off = predict_held_out(fit, held_out)
         adds = "anchors" + ("" if case.bare.places_mm is not None else " and the place of every row")
         rows.append(
             {
-                "model": " + ".join(["frame", *(law.adds for law in laws)]),
-                "adds": laws[-1].adds if laws else adds,
+                "model": " + ".join(["frame", *(effect_model.adds for effect_model in effect_models)]),
+                "adds": effect_models[-1].adds if effect_models else adds,
                 "parameters": len(fit.values),
                 "identifiable": fit.estimate.rank,
                 "train_rms_mm": fit.rms_mm,
-                "held_out_mean_mm": float(np.nanmean(np.abs(wrong))),
-                "held_out_rms_mm": rms(wrong),
-                "held_out_max_mm": float(np.nanmax(np.abs(wrong))),
+                "held_out_mean_mm": float(np.nanmean(np.abs(off))),
+                "held_out_rms_mm": rms(off),
+                "held_out_max_mm": float(np.nanmax(np.abs(off))),
             }
         )
     return pd.DataFrame(rows), errors
 
 
 def verdict_row(case, verdict, errors, *, where, confusable_with, next_runs):
-    """The row of real_verdicts but its notes; errors: of the steps, those of the bare frame and of the verdict."""
+    """The row of real_verdicts without notes; errors: of the steps, with those of the bare frame and of the verdict."""
     effects, probability, chosen = verdict
     before, after = errors.get((), errors[chosen.laws]), errors[chosen.laws]
     noise = chosen.noise_mm if UNEXPLAINED in effects else chosen.fit.noise_mm
-    gaps = [float(np.sqrt(max(rms(one) ** 2 - noise**2, 0.0))) for one in (before, after)]
+    gaps = [float(np.sqrt(max(rms(errors_mm) ** 2 - noise**2, 0.0))) for errors_mm in (before, after)]
     closed = share_closed(before, after, noise) if chosen.laws else (0.0, 0.0, 0.0)
     return {
         "effects": "+".join(effects) or "none",
@@ -87,11 +87,11 @@ def verdict_row(case, verdict, errors, *, where, confusable_with, next_runs):
 
 
 def bad_words(case, readings, rows):
-    """Sentences that name the readings left out and those that stand out but stay; rows (N,): their numbers."""
+    """Sentences on rejected readings and on used ones with large residuals; rows (N,): their numbers."""
     said = []
     for flags, words in (
-        (~case.used, "Left out, since other lengths contradict them"),
-        (case.suspect, "These stand out from their neighbours, but not so far that they are left out"),
+        (~case.used, "Rejected, because other lengths contradict them"),
+        (case.suspect, "Used, although their residuals exceed those of their neighbours"),
     ):
         named = [
             f"row {rows[row]} ({', '.join(np.array(readings)[flags[row]])})"
@@ -103,10 +103,10 @@ def bad_words(case, readings, rows):
 
 
 def points(case, chosen, readings, rows):
-    """Table real_points: a row per reading, under the frame alone (bare_) and under the verdict's laws.
+    """Table real_points: a row per reading, with the frame alone (bare_) and with the verdict's effects.
 
-    row, reading; the place in mm, z NaN in the plane; residuals, read less modelled length, in mm; used: whether it
-    was; stands_out: whether it is named though it was.
+    row, reading; the place in mm, z NaN in the plane; residuals, measured minus modelled length, in mm; used: in the
+    fit; stands_out: named for a large residual although used.
     """
     count, bare = len(readings), case.hypothesis(()) or chosen
     columns = {"row": np.repeat(rows, count), "reading": list(readings) * len(rows)}
@@ -123,7 +123,7 @@ def rms(values):
 
 
 def share_closed(before, after, noise_mm):
-    """Share of the gap that errors (N, k) close, and its 95 % interval by drawing blocks of neighbouring rows."""
+    """Explained fraction of the gap from errors (N, k), and its 95 % interval by a block bootstrap of rows."""
     generator = np.random.default_rng(_SEED)
     blocks = np.array_split(np.arange(len(before)), min(_BLOCKS, len(before)))
     counts = np.array([np.isfinite(before[block]).sum() for block in blocks])

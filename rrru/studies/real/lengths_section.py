@@ -1,4 +1,4 @@
-"""What a section of `real: sets:` says of a machine of which lengths are known, and the columns that it names."""
+"""Validated access to a section of `real: sets:` of a machine with measured lengths, and to its columns."""
 
 import numpy as np
 import pandas as pd
@@ -12,7 +12,7 @@ _LARGEST = 1e9
 
 
 class Section:
-    """The mapping of one set; every question names the set and the key where the answer is no good."""
+    """The mapping of one set; every method raises ConfigError with set and key for an invalid value."""
 
     def __init__(self, section, name, needed, optional):
         self.name = name
@@ -46,7 +46,7 @@ class Section:
         return values
 
     def number(self, key, value, low=-_LARGEST):
-        """A finite number from a lower limit on."""
+        """A finite number not below a lower limit."""
         if isinstance(value, bool) or not isinstance(value, (int, float)) or not low <= value <= _LARGEST:
             self.refuse(key, value, f"a number from {low:g} to {_LARGEST:g}")
         return float(value)
@@ -67,14 +67,14 @@ class Section:
         return np.array([self.number(f"{key}.{name}", given.get(name, 0.0), low=0.0) for name in names])
 
     def given(self, key, default=None):
-        """A value as it stands."""
+        """The raw value of a key."""
         return self._values.get(key, default)
 
 
 def numbers(frame, columns, name, least_rows, above=None):
     """Columns (n, c) of a frame as floats; raises IngestError with every fault by row, column and value.
 
-    name: what to call the file; rows are counted from 1. above: what every number has to lie above.
+    name: of the file in messages; rows are counted from 1; above: exclusive lower limit of every number.
     """
     problems = Problems(name)
     if not isinstance(frame, pd.DataFrame):
@@ -87,7 +87,7 @@ def numbers(frame, columns, name, least_rows, above=None):
             allowed = f"one of {', '.join(map(str, frame.columns))}"
             problems.add("missing", column=str(column), value="no such column", allowed=allowed)
     if len(frame) < least_rows:
-        allowed = f"at least {least_rows}: fewer do not tell the machine's numbers"
+        allowed = f"at least {least_rows}: fewer do not determine the machine's parameters"
         problems.add("rows", value=f"{len(frame)} rows", allowed=allowed)
     problems.refuse()
     values = np.column_stack(
@@ -103,9 +103,9 @@ def numbers(frame, columns, name, least_rows, above=None):
 
 
 def row_numbers(frame, section, default="row"):
-    """The rows' numbers (n,): those of the column that the key `row` names, `row` where there is one, else from 1.
+    """The rows' numbers (n,): of the column that the key `row` names, or of a column `row`, otherwise from 1.
 
-    Raises IngestError where two rows have the same one, or one has none.
+    Raises IngestError for repeated or missing numbers.
     """
     column = section.given("row", default)
     if column not in frame.columns:
@@ -121,7 +121,7 @@ def row_numbers(frame, section, default="row"):
 
 
 def held_out(frame, section):
-    """Flags (n,) of the rows that the column `held_out` keeps back; None without one, or where it keeps none or all.
+    """Flags (n,) of the held-out rows from the column `held_out`; None without the column, or if all flags are equal.
 
     Raises IngestError for a flag that is neither 0 nor 1.
     """

@@ -1,4 +1,4 @@
-"""The row of a series whose file cannot be used: the others of its set are studied all the same."""
+"""The row of a series with an unusable file; the other series of its set are still studied."""
 
 import pandas as pd
 
@@ -9,13 +9,13 @@ REFUSED = "refused"
 
 
 def refused(series: Series, error: RrruError) -> dict[str, pd.DataFrame]:
-    """Frames by name, without the campaign: the row of `real_verdicts`, whose notes say why; numbers are left out."""
+    """Frames by name, without the campaign: the row of `real_verdicts` with the reason in its notes, no numbers."""
     row = dict.fromkeys(("where", "confusable_with", "next_runs"), "") | {"points": 0, "dropped_points": 0}
-    own = {"effects": REFUSED, "notes": f"left out: {error}", **named(series)}
-    return {"real_verdicts": pd.DataFrame([row | own])}
+    reason = {"effects": REFUSED, "notes": f"left out: {error}", **named(series)}
+    return {"real_verdicts": pd.DataFrame([row | reason])}
 
 
 def named(series: Series) -> dict[str, str]:
-    """What every row of `real_verdicts` says of the series itself."""
+    """Columns of `real_verdicts` on the series itself."""
     robot = series.section.get("robot", series.dataset)
     return {"dataset": series.dataset, "robot": robot, "source": series.file.name}

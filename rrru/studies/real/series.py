@@ -1,4 +1,4 @@
-"""Which real series there are to look at: files of the configuration's data sets, shipped ones and the user's own."""
+"""Available real series: files of the configuration's data sets, shipped ones and the user's own."""
 
 import os
 from collections.abc import Mapping
@@ -11,7 +11,7 @@ import pandas as pd
 from rrru.errors import ConfigError
 from rrru.studies.config import own_robot_file
 
-# the folder that data which may not be shipped are read from
+# names the folder of data that may not be redistributed
 VARIABLE = "RRRU_REAL_DATA"
 
 
@@ -19,7 +19,7 @@ VARIABLE = "RRRU_REAL_DATA"
 class Series:
     """One measured series: its name, that of its data set, the file, and the set's section of the configuration.
 
-    label: the name without the data set's; variant: which way of reading the file, "" where there is one.
+    label: the name without that of the data set; variant: how to read the file, "" where there is one way only.
     """
 
     name: str
@@ -38,7 +38,7 @@ class Series:
                 names = frame.columns
             else:
                 frame = pd.read_csv(self.file, skipinitialspace=True)
-                # pandas numbers the names that come twice
+                # pandas renames repeated columns
                 names = pd.read_csv(self.file, skipinitialspace=True, header=None, nrows=1, dtype=str).iloc[0].dropna()
         except (OSError, ValueError) as error:
             raise ConfigError(f"{where}: {str(error).strip()}; allowed: CSV or parquet, one row per pose") from error
@@ -50,7 +50,7 @@ class Series:
         return frame
 
     def column(self, frame: pd.DataFrame, key: str, names: Any) -> Any:
-        """One column or several of the file; raises ConfigError naming those that it lacks."""
+        """One column or several of the file; raises ConfigError for a missing one."""
         lacking = [name for name in ([names] if isinstance(names, str) else names) if name not in frame]
         if lacking:
             known = ", ".join(frame.columns)
@@ -61,15 +61,15 @@ class Series:
 
 
 def folders(section: Mapping[str, Any]) -> tuple[Path, ...]:
-    """Folders that the data lie in: the one that the environment names goes before the configuration's."""
-    own = os.environ.get(VARIABLE)
-    return (*([Path(own)] if own else []), Path(section["folder"]))
+    """Folders of the data: the one named in the environment precedes that of the configuration."""
+    named = os.environ.get(VARIABLE)
+    return (*([Path(named)] if named else []), Path(section["folder"]))
 
 
 def found(section: Mapping[str, Any], name: str) -> tuple[Series, ...]:
     """The series of one data set, in order of their files' names; none where it has no files here.
 
-    section: the configuration's `real`. A series is called by its set, what stands for the * of its file's name, and
+    section: the configuration's `real`. The name of a series has its set, the part of its file name that matches *, and
     its variant.
     """
     own = dict(section["sets"][name])
@@ -93,10 +93,10 @@ def used(section: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
 
 
 def check(config: Mapping[str, Any]) -> None:
-    """Raise ConfigError where a data set names a robot or a variant that does not exist, or no way to read it."""
+    """Raise ConfigError where a data set names an unknown robot or variant, or does not say how to read it."""
     sets = used(config["real"])
     if not sets:
-        raise ConfigError("real.sets: got none but null; allowed: at least one set")
+        raise ConfigError("real.sets: got only null; allowed: at least one set")
     for name, section in sets.items():
         where = f"real.sets.{name}"
         pattern = PurePath(section["files"])
@@ -110,12 +110,12 @@ def check(config: Mapping[str, Any]) -> None:
 
 
 def _check_arm(where: str, section: Mapping[str, Any], robots: Mapping[str, Any]) -> None:
-    """Raise ConfigError where the section of an arm names what does not exist, or no way to read it."""
+    """Raise ConfigError where the section of an arm names an unknown robot or target, or lacks its readings."""
     if ("robot" in section) == ("chain" in section):
         raise ConfigError(
             f"{where}: got {'both' if 'robot' in section else 'no'} robot and chain; allowed: one of them"
         )
-    # not at the top: it imports every robot, and every start of the workflow imports this
+    # imported here because it imports every robot, and every start of the workflow imports this module
     from rrru.robots.catalogue import OWN
 
     own = [name for name, robot in robots.items() if set(OWN) & set(robot)]
@@ -126,12 +126,12 @@ def _check_arm(where: str, section: Mapping[str, Any], robots: Mapping[str, Any]
         )
     if "readings" not in section:
         raise ConfigError(f"{where}: got no readings; allowed: at least one target with its position")
-    targets, beside = [*section["readings"]], section.get("world_targets", ())
-    for target in beside:
+    targets, fixed = [*section["readings"]], section.get("world_targets", ())
+    for target in fixed:
         if target not in targets:
-            raise ConfigError(f"{where}.world_targets: got {target!r}; allowed: of readings: {', '.join(targets)}")
-    if set(targets) == set(beside):
-        raise ConfigError(f"{where}.world_targets: got all of readings; allowed: all but one: what the robot holds")
+            raise ConfigError(f"{where}.world_targets: got {target!r}; allowed: keys of readings: {', '.join(targets)}")
+    if set(targets) == set(fixed):
+        raise ConfigError(f"{where}.world_targets: got all of readings; allowed: all except one on the robot")
     for key, names in _named(section):
         twice = sorted({name for name in names if names.count(name) > 1})
         if twice:
@@ -139,7 +139,7 @@ def _check_arm(where: str, section: Mapping[str, Any], robots: Mapping[str, Any]
 
 
 def _named(section: Mapping[str, Any]) -> list[tuple[str, list[str]]]:
-    """Keys of an arm's section and the columns that each names, which have to differ."""
+    """Keys of an arm's section and the columns of each, which have to differ."""
     ways = {"joints": section} | {f"variants.{name}.joints": one for name, one in section.get("variants", {}).items()}
     joints = [(key, [*one["joints"].values()]) for key, one in ways.items() if "joints" in one]
     readings = [
@@ -150,21 +150,22 @@ def _named(section: Mapping[str, Any]) -> list[tuple[str, list[str]]]:
 
 
 def missing(section: Mapping[str, Any], name: str) -> str:
-    """What is to be told of a data set without files here."""
+    """The message for a data set without files."""
     where = " or ".join(map(str, folders(section)))
-    return f"real.sets.{name}: no {section['sets'][name]['files']} in {where}: left out; {VARIABLE} may name its folder"
+    pattern = section["sets"][name]["files"]
+    return f"real.sets.{name}: skipped, no {pattern} in {where}; set {VARIABLE} to its folder"
 
 
 def _label(pattern: str, file: Path) -> str:
-    """What stands for the * of a pattern in a file's name, "" where it has none."""
+    """The part of a file's name that matches the * of a pattern, "" where it has none."""
     before, star, after = Path(pattern).name.partition("*")
     return file.name.removeprefix(before).removesuffix(after) if star else ""
 
 
 def files(config: Mapping[str, Any], name: str, series: str | None = None) -> list[str]:
-    """The files of a data set, or of one of its series, and of what describes its robot; none where they are not here.
+    """The existing files of a data set or of one of its series, and those that describe its robot.
 
-    series: its name, by default all are meant.
+    series: its name, by default all series.
     """
     every = found(config["real"], name)
     result = list(dict.fromkeys(one.file for one in every if series in (None, one.name)))
@@ -177,7 +178,7 @@ def files(config: Mapping[str, Any], name: str, series: str | None = None) -> li
 
 
 def part(config: Mapping[str, Any], name: str) -> dict[str, Any]:
-    """What is told of a data set: its own part of the configuration, and the robot that it names."""
+    """The part of the configuration of a data set, with the robot that it names."""
     section, real = config["real"]["sets"][name], {key: config["real"][key] for key in ("folder", "gap")}
     robots = {section["robot"]: config["robots"][section["robot"]]} if "robot" in section else {}
     return {"set": name, "real": real | {"sets": {name: section}}, "robots": robots}

@@ -1,4 +1,4 @@
-"""A real series of an arm as a campaign file of our own form: one row per target and stop, mm, rad, quaternions."""
+"""A real series of an arm as a campaign file in our own format: one row per target and stop, mm, rad, quaternions."""
 
 import re
 from collections.abc import Iterator, Mapping
@@ -14,19 +14,18 @@ from rrru.campaign.noise import typical
 from rrru.errors import ConfigError, IngestError
 from rrru.studies.real.series import Series
 
-# flags of the rows that are kept out of every fit, and the numbers of the rows in the file
+# columns: flags of held-out rows, and numbers of the rows in the file
 HELD_OUT, PLACE = "held_out", "row"
 TEMPERATURE = "temperature_c"
 
 
 def sheet(series: Series, raw: pd.DataFrame) -> pd.DataFrame:
-    """Columns of a campaign file, and HELD_OUT and PLACE; rows in the order driven, the targets of each together.
+    """Columns of a campaign file with HELD_OUT and PLACE; rows in the order driven, the targets of each together.
 
-    The set's section says which columns are what: joints, {actuator column: theirs}, in angle_unit, absent where they
-    are called like ours; readings, {target: {position, unit, rotation, sequence, rotation_unit}}; temperature, in
-    degrees Celsius; held_out. The number of the row stands for the time. Targets that were not seen are left out.
-    Raises ConfigError for a column that is not there or not of numbers, for a blank joint of a row with readings, and
-    where nothing was read.
+    The set's section assigns the columns: joints, {actuator column: theirs}, in angle_unit, absent where they have our
+    names; readings, {target: {position, unit, rotation, sequence, rotation_unit}}; temperature, in degrees Celsius;
+    held_out. The row number replaces the time. Targets without readings are left out. Raises ConfigError for a missing
+    column, for one that is not of numbers, for a blank joint of a row with readings, and where there are no readings.
     """
     section, parts = series.section, []
     common = {"trajectory": "poses", "time_s": np.arange(len(raw), dtype=float), HELD_OUT: _held_out(series, raw)}
@@ -53,14 +52,14 @@ def sheet(series: Series, raw: pd.DataFrame) -> pd.DataFrame:
 
 
 def joint_columns(series: Series, raw: pd.DataFrame) -> Mapping[str, str]:
-    """Our actuator columns to theirs; where the section names none, all of the file's that are called like ours."""
+    """Our actuator columns mapped to theirs; where the section names none, all of the file's with our names."""
     named = series.section.get("joints")
     return named or {name: name for name in raw if name.startswith("q") and name.endswith(("_rad", "_mm"))}
 
 
-def retold(error: IngestError, series: Series, whole: pd.DataFrame) -> IngestError:
-    """What ingest says of a sheet, in rows and columns of the series' file."""
-    theirs, told = dict(series.section.get("joints", {})) | {TEMPERATURE: series.section.get("temperature")}, []
+def in_series_terms(error: IngestError, series: Series, whole: pd.DataFrame) -> IngestError:
+    """The IngestError of a sheet in terms of rows and columns of the series' file."""
+    theirs, problems = dict(series.section.get("joints", {})) | {TEMPERATURE: series.section.get("temperature")}, []
     for problem in error.problems:
         row, column, names = problem.get("row"), problem.get("column"), theirs
         if row is not None and row <= len(whole):
@@ -69,13 +68,13 @@ def retold(error: IngestError, series: Series, whole: pd.DataFrame) -> IngestErr
             names = theirs | dict(zip(MEASURED, reading["position"], strict=True))
         if column is not None:
             column = ", ".join(names.get(name, name) for name in column.split(", "))
-        own = {"file": str(series.file), "row": row, "column": column, "value": in_file(problem["value"], whole)}
-        told.append(problem | own)
-    return IngestError(told)
+        place = {"file": str(series.file), "row": row, "column": column, "value": in_file(problem["value"], whole)}
+        problems.append(problem | place)
+    return IngestError(problems)
 
 
 def in_file(text: str, whole: pd.DataFrame) -> str:
-    """A text that counts the rows of a sheet, as points of its one run or as rows, by rows of the file and targets."""
+    """A text with rows of a sheet, given as points of its single run or as rows, in rows of the file and targets."""
 
     def place(found: re.Match) -> str:
         """A row of the sheet in words."""
@@ -88,10 +87,10 @@ def in_file(text: str, whole: pd.DataFrame) -> str:
 
 
 def stated_noise(series: Series, raw: pd.DataFrame) -> tuple[float | None, float | None]:
-    """Noise per axis that the instrument states: of positions in mm and of orientations in rad, None where it does not.
+    """Noise per axis stated by the instrument: of positions in mm and of orientations in rad, None where not stated.
 
-    See `rrru.campaign.noise.typical`. Raises ConfigError for a column whose median is not above 0: no
-    instrument is without noise.
+    See `rrru.campaign.noise.typical`. Raises ConfigError for a column whose median is not above 0, since every
+    instrument has noise.
     """
     result = []
     for key, scales, unit in (("position_std", MM, "unit"), ("rotation_std", RAD, "rotation_unit")):
@@ -111,7 +110,7 @@ def stated_noise(series: Series, raw: pd.DataFrame) -> tuple[float | None, float
 def _read(
     series: Series, raw: pd.DataFrame, target: str, reading: Mapping[str, Any]
 ) -> Iterator[tuple[str, np.ndarray]]:
-    """Columns of what was read of one target."""
+    """Columns of the readings of one target."""
     key = f"readings.{target}"
     for ours, theirs in zip(MEASURED, reading["position"], strict=True):
         yield ours, MM[reading.get("unit", "mm")] * _numbers(series, raw, key, theirs)
@@ -125,7 +124,7 @@ def _read(
 
 
 def _held_out(series: Series, raw: pd.DataFrame) -> np.ndarray:
-    """Which rows (n,) are held out: those that the file flags, else every third from the second on.
+    """Flags (n,) of the held-out rows: those of the file, otherwise every third from the second on.
 
     Raises ConfigError for a flag that is neither 0 nor 1, and where no row is left for a fit.
     """
@@ -143,7 +142,7 @@ def _held_out(series: Series, raw: pd.DataFrame) -> np.ndarray:
 
 
 def _numbers(series: Series, raw: pd.DataFrame, key: str, name: str) -> np.ndarray:
-    """A column (n,) of numbers, NaN where blank; raises ConfigError naming the first cell that holds none."""
+    """A column (n,) of numbers, NaN where blank; raises ConfigError naming the first cell that is not a number."""
     cells = series.column(raw, key, name)
     values = pd.to_numeric(cells, errors="coerce").to_numpy(dtype=float)
     wrong = np.flatnonzero(np.isinf(values) | (np.isnan(values) & cells.notna().to_numpy()))

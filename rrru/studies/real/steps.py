@@ -1,9 +1,8 @@
-"""Model after model on one real series: what each adds, and what it leaves on rows that no fit has seen.
+"""Models of one real series step by step: what each adds, and its residuals on held-out rows.
 
-(a) frames, (b) + geometry, (c) + drive compliance, (c2) + flexible links, (c3) + cross
-compliance, (d) + the first two harmonics of every drive,
-(e) + a drift of the base, linear in the order of the rows: plain least squares, nothing chosen. They are the reference
-for what the diagnosis names. Lengths in mm, angles in rad.
+(a) frames, (b) + geometry, (c) + drive compliance, (c2) + flexible links, (c3) + cross compliance, (d) + the first two
+harmonics of every drive, (e) + a drift of the base, linear in the order of the rows. All are plain least squares
+without model selection. They are the reference for the causes that the diagnosis names. Lengths in mm, angles in rad.
 """
 
 import time
@@ -24,7 +23,7 @@ from rrru.kinematics.robot import Robot
 from rrru.studies.real.frame_fit import FRAMES, fit_frames, frames
 
 _HARMONICS = "harmonics"
-# letter, what it adds in words, the effect that does
+# letter, what it adds in words, name of the added effect
 _MODELS = (
     ("b", "geometry", ""),
     ("c", "drive compliance", "drive_compliance"),
@@ -39,7 +38,7 @@ _MODELS = (
 class Step:
     """A fitted model: its letter, what it adds in words, its State, number of parameters and of identified ones.
 
-    trained_mm, held_out_mm: distances (n,) that it leaves on the rows that it was fitted on, and on those held out.
+    trained_mm, held_out_mm: residual distances (n,) on the rows that it was fitted on, and on held-out rows.
     """
 
     model: str
@@ -65,9 +64,9 @@ class Step:
 
 
 def held_out(left_mm: np.ndarray) -> dict[str, float]:
-    """Mean, rms and largest of what is left on the rows held out, NaN where none is, by the columns of tables."""
-    mean, most = (float(left_mm.mean()), float(left_mm.max())) if len(left_mm) else (np.nan, np.nan)
-    return {"held_out_mean_mm": mean, "held_out_rms_mm": rms(left_mm), "held_out_max_mm": most}
+    """Mean, rms and largest held-out residual by column of the tables, NaN where no row is held out."""
+    mean, largest = (float(left_mm.mean()), float(left_mm.max())) if len(left_mm) else (np.nan, np.nan)
+    return {"held_out_mean_mm": mean, "held_out_rms_mm": rms(left_mm), "held_out_max_mm": largest}
 
 
 def rms(values: np.ndarray) -> float:
@@ -76,33 +75,33 @@ def rms(values: np.ndarray) -> float:
 
 
 def held_out_mm(case: Case, state: State) -> np.ndarray:
-    """Distances (n,) by which a state misses the held-out rows of what the robot holds; NaN where it has no pose."""
+    """Residual distances (n,) of a state on held-out rows of targets on the robot; NaN where it has no pose."""
     held = (case.measurements["status"] == rows.HELD_OUT).to_numpy() & held_by_robot(case)
     return np.linalg.norm(case.left(state)[: len(held)][held], axis=1)
 
 
 def trained_mm(case: Case, state: State) -> np.ndarray:
-    """Distances (n,) by which a state misses the rows that it was fitted on, of what the robot holds."""
+    """Residual distances (n,) of a state on the rows of targets on the robot that it was fitted on."""
     return np.linalg.norm(case.residual(state)[counted(case)], axis=1)
 
 
 def held_by_robot(case: Case) -> np.ndarray:
-    """Which rows (n,) of a case's measurements are of what the robot holds, not of what stands beside it."""
-    beside = rows.on_the_world(case.measurements)
-    return np.ones(len(case.measurements), dtype=bool) if beside is None else ~beside
+    """Flags (n,) of a case's measurements of targets on the robot, not fixed in the world."""
+    fixed = rows.on_the_world(case.measurements)
+    return np.ones(len(case.measurements), dtype=bool) if fixed is None else ~fixed
 
 
 def counted(case: Case) -> np.ndarray:
-    """Which rows (m,) of a case are positions of what the robot holds."""
+    """Flags (m,) of a case's rows that are positions of targets on the robot."""
     return case.positions & held_by_robot(case)[case.at]
 
 
 def steps(case: Case) -> tuple[Step, ...]:
-    """The models one after another; one whose effects the robot does not have, or whose fit does not end, is left out.
+    """The models in order, without those whose effects the robot does not have or whose fit does not converge.
 
-    Raises FitError where that of the geometry does not end.
+    Raises FitError where the fit of the geometry does not converge.
     """
-    library = dict(case.library) | _own(case)
+    library = dict(case.library) | _extra_effects(case)
     case, began = replace(case, library=library), time.perf_counter()
     none = State(np.zeros(len(case.mechanism.parameters)), {})
     state = fit_frames(case, none)
@@ -119,7 +118,7 @@ def steps(case: Case) -> tuple[Step, ...]:
         except FitError:
             if not effect:
                 raise
-            # the next models go on from those before
+            # the next models continue from the ones before
             names = names[:-1]
             continue
         numbers = len(fit.estimate.values), fit.estimate.rank, time.perf_counter() - began
@@ -135,7 +134,7 @@ def verdict_step(case: Case, state: State, seconds: float) -> Step:
 
 
 def _identified(case: Case, state: State, calibrated: bool = True) -> int:
-    """How many of the numbers of a state's effects, and of the calibration where that is fitted, the rows tell."""
+    """Number of identifiable parameters of a state's effects, and of the calibration where that is fitted."""
     linear = case.linearise(state, [])
     blocks = [linear.base] * calibrated + [linear.columns[key] for key in state.effects]
     return numerical_rank(np.concatenate(blocks, axis=-1).reshape(linear.data.size, -1))
@@ -146,8 +145,8 @@ def _left(case: Case, state: State) -> tuple[np.ndarray, np.ndarray]:
     return trained_mm(case, state), held_out_mm(case, state)
 
 
-def _own(case: Case) -> dict[str, Effect]:
-    """The laws that only these models have, as far as a robot has sites for them."""
+def _extra_effects(case: Case) -> dict[str, Effect]:
+    """Effects that only these models have, where a robot has sites for them."""
     result, robot = {FRAMES: frames(case.mechanism)}, case.mechanism
     sharp = find("transmission_orders", robot)
     if sharp is not None:
@@ -156,7 +155,7 @@ def _own(case: Case) -> dict[str, Effect]:
     return result
 
 
-def laws(robot: Robot) -> dict[str, Effect]:
-    """The library's laws of the models, by name, as far as a robot has sites for them."""
+def library_effects(robot: Robot) -> dict[str, Effect]:
+    """Effects of the library in the models, by name, where a robot has sites for them."""
     found = {name: find(name, robot) for _, _, name in _MODELS if name and name != _HARMONICS}
     return {name: effect for name, effect in found.items() if effect is not None}

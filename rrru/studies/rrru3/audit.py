@@ -1,4 +1,4 @@
-"""Misprints and contradictions of paper A: what the printed form gives, and what an independent check gives."""
+"""Misprints and contradictions of paper A: values of the printed form and of an independent check."""
 
 from dataclasses import replace
 from functools import cache
@@ -22,7 +22,7 @@ _FRAME = (
     "frame not stated; eqs. (4), (8) suggest theirs",
     "robot frame of eq. (7)",
 )
-# that frame is turned by pi about z
+# that frame is rotated by pi about z
 _TURNED = np.array([-1.0, -1.0, 1.0])
 _SINGULAR_X = np.linspace(-800.0, -700.0, 2001)
 _TWICE = "abstract and section 3.3"
@@ -93,12 +93,12 @@ def _translational_crossing():
 @finding(
     "section 3.2, group 1",
     "spikes and a poor boundary, unexplained",
-    "a constraint singularity lies on the line, which eq. (8) does not see",
+    "a constraint singularity is on the line, which eq. (8) does not show",
     "mm",
     lambda _, right: -800.0 <= right <= -700.0,
 )
 def _constraint_crossing():
-    """X where the platform can turn with locked drives, on y = 0."""
+    """X where the platform can rotate with locked drives, on y = 0."""
     points = _line(x=_SINGULAR_X)
     return np.nan, _first_crossing(singularity.constraint_determinant(_ROBOT, points, _ROBOT.inverse(points)))
 
@@ -106,12 +106,12 @@ def _constraint_crossing():
 @finding(
     "section 3.2, Fig. 9",
     "compensation removes several sharp spikes",
-    "a calibration takes off a smooth curve only: spikes that it removes belong to the commands, not to chance",
+    "a calibration removes a smooth curve only: spikes that it removes come from the commands, not from random errors",
     "mm",
     lambda printed, right: right < 0.1 * printed,
 )
 def _spikes():
-    """Height on group 1 of a spike that is gone in 0.294 to 1.220, and of the highest in what Table 5 takes off."""
+    """Height on group 1 of a spike that cannot be in 0.294 to 1.220, and of the highest in Table 5's correction."""
     return SPIKE_MM, spikes(np.linalg.norm(_predicted(TABLE_5, _line()), axis=1))[0]
 
 
@@ -123,7 +123,7 @@ def _spikes():
     lambda printed, right: abs(right / printed - 1.0) < 0.05,
 )
 def _largest_error():
-    """Largest error that Table 5 predicts at y = 112, against the printed largest error (group 6)."""
+    """Largest error that Table 5 predicts at y = 112, compared with the printed largest error (group 6)."""
     return ERRORS_MM["lines_before_max"], np.linalg.norm(_predicted(TABLE_5, _line(y=112.0)), axis=1).max()
 
 

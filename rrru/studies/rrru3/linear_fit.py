@@ -1,13 +1,13 @@
-"""Least mean distance of many draws on a linearised model: what the twin's search can afford for every candidate."""
+"""Least mean distance of many draws on a linearised model, fast enough for every candidate of the twin's search."""
 
 import numpy as np
 
 from rrru.calibration.identifiability import RANK_TOLERANCE
 from rrru.errors import FitError
 
-# weight in mm of the squared excess over a bound, counted in bounds: they are kept to some thousandths
+# weight in mm of the squared excess over a bound, in half widths: violations are some thousandths
 _STIFFNESS = 10.0
-# shares of a Newton step that are tried
+# tested fractions of a Newton step
 _SIZES = np.array([0.0, *0.5 ** np.arange(10)])
 
 
@@ -15,7 +15,7 @@ def linear_fit(mechanism, theta, measured, start):
     """Deviations (d, p) of least mean distance within the mechanism's bounds, and the minima (d,), of d draws.
 
     The model is linearised once, at the least-squares deviations of the draws' mean. theta, start: (n, 3); measured:
-    (d, n, 3). Raises FitError where the iteration leaves the reach.
+    (d, n, 3). Raises FitError where the iteration leaves the workspace.
     """
     parameters, centre = mechanism.parameters, measured.mean(axis=0)
     deviations = parameters.nominal
@@ -36,12 +36,12 @@ def _linearised(mechanism, theta, measured, start, deviations):
     residual = measured - mechanism.forward(theta, deviations, start)
     jacobian = mechanism.parameter_jacobian(measured - residual, theta, deviations)
     if not (np.isfinite(residual).all() and np.isfinite(jacobian).all()):
-        raise FitError("the candidate's calibration leaves the reach")
+        raise FitError("the candidate's calibration leaves the workspace")
     return residual, jacobian
 
 
 class _Bounds:
-    """A wall of squared excess at the bounds of deviations about a centre, in coordinates q: value, slope, bend."""
+    """Quadratic penalty on violated bounds of deviations about a centre, in coordinates q: value, slope, curvature."""
 
     def __init__(self, back, centre, low, high):
         self.half = 0.5 * (high - low)
@@ -56,7 +56,7 @@ class _Bounds:
         """Penalties (...)."""
         return _STIFFNESS * (self.excess(q) ** 2).sum(axis=-1)
 
-    def slope_and_bend(self, q):
+    def gradient_and_hessian(self, q):
         """First and second derivatives (d, p), (d, p, p) of the penalties."""
         excess = self.excess(q)
         bend = np.einsum("dk,kp,kq->dpq", excess != 0.0, self.back, self.back)
@@ -75,7 +75,7 @@ def _least_mean(residual, basis, bounds):
 
     value, every = cost(q), np.arange(len(q))
     for _ in range(60):
-        step = _newton_step(residual - _moved(basis, q), basis, *bounds.slope_and_bend(q))
+        step = _newton_step(residual - _moved(basis, q), basis, *bounds.gradient_and_hessian(q))
         tried = q + _SIZES[:, None, None] * step
         costs = cost(tried)
         best = costs.argmin(axis=0)

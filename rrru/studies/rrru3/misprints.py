@@ -1,4 +1,4 @@
-"""Misprinted equations of paper A, each evaluated at a pose: printed, corrected, and beside an independent check."""
+"""Misprinted equations of paper A, evaluated at a pose: printed, corrected, and by an independent check."""
 
 from functools import cache
 

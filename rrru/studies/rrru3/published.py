@@ -1,4 +1,4 @@
-"""Paper A's numbers beside this study's, from the configuration and the tables of the reproduced campaign."""
+"""Paper A's numbers compared with this study's, from the configuration and the tables of the reproduced campaign."""
 
 from dataclasses import dataclass
 
@@ -16,7 +16,7 @@ _DIMENSIONS = ("L1_mm", "L2_mm", "L3_mm", "R_mm", "r_mm")
 
 @dataclass(frozen=True)
 class Reproduced:
-    """Which campaign, calibrations and method stand for the paper's."""
+    """The campaign, calibrations and method that correspond to the paper's."""
 
     campaign: str
     line_calibration: str
@@ -27,8 +27,8 @@ class Reproduced:
 def published_rows(settings, errors, calibrations, parameters, genetic, genetic_parameters, sweep_runs, redraw_counts):
     """Rows of `published` for paper A.
 
-    settings: the configuration's `genetic` and `reproduce`, with the campaign's `nominal` robot and what is `virtual`
-    of it; the others: the tables of those names. Numbers that this study does not have are null.
+    settings: the configuration's `genetic` and `reproduce`, with the campaign's `nominal` robot and its `virtual`
+    part; the others: the tables of those names. Numbers that this study does not have are null.
     """
     chosen, nominal, virtual = Reproduced(**settings["reproduce"]), settings["nominal"], settings["virtual"]
     errors, calibrations, parameters, genetic, found = (
@@ -56,7 +56,7 @@ def published_rows(settings, errors, calibrations, parameters, genetic, genetic_
 
 
 def _design(nominal, virtual, genetic):
-    """Dimensions, motion and counts as configured; without what a measured campaign or other trajectories lack."""
+    """Dimensions, motion and counts as configured; where the campaign has them."""
     shape = virtual["trajectories"] if virtual else {}
     result = {
         **{key: value for key, value in nominal["dimensions"].items() if key in _DIMENSIONS},
@@ -77,16 +77,16 @@ def _design(nominal, virtual, genetic):
 
 
 def _sweep(runs, operators):
-    """Median objective of the one population, run to the end, at every swept value that the paper has."""
-    own = (runs["population"] == "one") & (runs["operators"] == operators) & (runs["stop"] == "end")
-    median = runs[own].groupby(["parameter", "value"])["objective_mm"].median()
+    """Median objective of a single population, run to the end, at every swept value that the paper has."""
+    chosen = (runs["population"] == "one") & (runs["operators"] == operators) & (runs["stop"] == "end")
+    median = runs[chosen].groupby(["parameter", "value"])["objective_mm"].median()
     labels = {"crossover_fraction": "P_c", "migration_fraction": "P_m"}
     printed = {(parameter, float(s)): f"{label}={s}" for parameter, label in labels.items() for s in SETTINGS}
     return {printed[key]: objective for key, objective in median.items() if key in printed}
 
 
 def _fitted(parameters, chosen):
-    """The printed 14 deviations of both calibrations; dR and dr alone are of the genetic algorithm's median run."""
+    """The printed 14 deviations of both calibrations; dR and dr separately are from the median genetic run."""
     values = parameters.set_index(["calibration", "method", "parameter"])["value"]
     result = {}
     for label, calibration in (("lines", chosen.line_calibration), ("spiral", chosen.spiral_calibration)):
@@ -122,7 +122,7 @@ def _error_numbers(errors, parameters, chosen):
 
 
 def _links(parameters, chosen):
-    """Margin of the link errors' order, from those that both calibrations found."""
+    """Margin of the link errors' order, from the estimates of both calibrations."""
     values = parameters.set_index(["calibration", "method", "parameter"])["value"]
     names = (chosen.line_calibration, chosen.spiral_calibration)
     found = [[values.get((name, chosen.method, link)) for link in computed.LINKS] for name in names]
@@ -130,7 +130,7 @@ def _links(parameters, chosen):
 
 
 def _objective(calibrations, runs, chosen):
-    """Mean distance in mm that the line calibration leaves on its own points."""
+    """Mean residual distance in mm of the line calibration on its own points."""
     if chosen.method == "genetic":
         return runs["objective_mm"].median()
     fitted = (calibrations["calibration"] == chosen.line_calibration) & (calibrations["method"] == chosen.method)

@@ -1,5 +1,5 @@
-"""What of the paper holds under other draws of non-repeatability and noise: the same robot measured, calibrated and
-driven again.
+"""Robustness of the paper's numbers to other draws of non-repeatability and noise: the same robot measured, calibrated
+and driven again.
 """
 
 from dataclasses import replace
@@ -23,8 +23,8 @@ _QUANTILES = (0.05, 0.95)
 def redraws(campaign, patterns, method, count, use_near_singularity=True):
     """Rows of `redraws` of a virtual campaign over `count` draws.
 
-    patterns: trajectories of the line and of the spiral calibration; method: "genetic" is stood in for by its optimum,
-    the least mean distance. Empty where the numbers do not apply.
+    patterns: trajectories of the line and of the spiral calibration; method: "genetic" is replaced by its optimum, the
+    least mean distance. Empty where the numbers do not apply.
     """
     columns = ["draw", "item", "kind", "value", "met"]
     if count == 0 or not {run.trajectory for run in campaign.plan.runs} >= numbers.TRAJECTORIES:
@@ -65,7 +65,7 @@ def _middle(values):
 
 
 def _attained(campaign, motion, deviations):
-    """Positions (n, 3) that the robot attains with commands corrected by deviations, before anything random.
+    """Positions (n, 3) that the robot attains with commands corrected by deviations, without random errors.
 
     motion: of the nominal commands, whose loads are the same.
     """

@@ -1,9 +1,9 @@
-"""Tables of paper A's study beside those that every campaign gets."""
+"""Tables of paper A's study, in addition to those of every campaign."""
 
 from rrru.store.schema import read_tables
 
 TABLES = read_tables("""
-operators              str    reading of the paper, see `sweep_runs` {matlab_gaussian, matlab_adaptive, pygad}
+operators              str    interpretation of the paper, see `sweep_runs` {matlab_gaussian, matlab_adaptive, pygad}
 stop                   str    where runs end, see `sweep_runs` {stall, end}
 parameter              str    swept setting {crossover_fraction, migration_fraction}
 population             str    one population, or islands {one, islands}
@@ -11,52 +11,53 @@ item                   str    what the number or order is, as in `published`
 kind                   str    printed number or printed order {number, order}
 
 ## sweep_match | tables/sweep_match.parquet | table operators stop population
-Every reading of the genetic algorithm beside Tables 3 and 4, whose curves are single runs.
+Every interpretation of the genetic algorithm compared with Tables 3 and 4, whose curves are single runs.
 --
 table                  str    of the paper {Table 3, Table 4}
 operators stop parameter population
 settings               int    values that are compared
 runs                   int    feasible runs of them
-level_mm               float  mean of the medians here above that of the printed curve; belongs to the robot
-distance_mm            float  RMS distance of medians and printed curve, each taken from its mean
+level_mm               float  mean of the medians here minus that of the printed curve; depends on the robot
+distance_mm            float  RMS distance of medians and printed curve, each minus its mean
 chance_low_mm          float  lower end of the middle 95 % of that distance for curves of single runs drawn here
 chance_high_mm         float  upper end
-distance_shared_mm     float  the distance over the values that all readings have
+distance_shared_mm     float  the distance over the values that all interpretations have
 nearest                bool   that distance is the least of this table of the paper
 scatter_mm             float  range of the seeds at one value, median over the values
 range_mm               float  range of the medians
 chance_range_low_mm    float  lower end of the middle 95 % of the range of curves of single runs drawn here
 chance_range_high_mm   float  upper end
 printed_range_mm       float  range of the printed curve
-verdict                str    reproduced where distance and range are as chance makes them here {reproduced,
+verdict                str    reproduced where distance and range are within those of random curves {reproduced,
     not reproduced}
 
 ## twin_numbers | tables/twin_numbers.parquet | name
 Every number of the twin that was searched, and the bounds of the search.
 --
 name                   str    name of the number
-value                  float  what the configuration holds
+value                  float  value in the configuration
 low                    float  lower bound of the search
 high                   float  upper bound
 at_bound               bool   within a hundredth of the bounds' width of one of them
 
 ## redraws | tables/redraws.parquet | draw item
-The paper's numbers and orders on the same robot under other draws of wobble and noise than those of the twin's search.
+The paper's numbers and orders on the same robot for other draws of non-repeatability and noise than in the twin's
+search.
 --
 draw                   int    number of the draw
 item kind
 value                  float  number in mm, or margin of the order, positive where it holds
-met                    bool   number within 15 % of the printed one (an upper limit: not above it by more), order holds
+met                    bool   number within 15 % of the printed one (an upper limit: at most 15 % above), order holds
 
 ## redraw_counts | tables/redraw_counts.parquet | item
-How often each of them is met over the draws of `redraws`, and how many are in one draw.
+How often each item of `redraws` is met over the draws, and how many are met in one draw.
 --
 item                   str    as in `redraws`; numbers, orders, all: how many of them are met in one draw
 kind                   str    printed number, printed order, or a count over one draw {number, order, count}
 targets                int    1; of a count: how many there are
 draws                  int    draws
 met                    int    draws in which it is met; of a count: in which all are
-median                 float  median over the draws, of an order its margin, of a count the targets met
+median                 float  median over the draws; for an order its margin, for a count the targets met
 low                    float  lower end of the middle 90 %
 high                   float  upper end
 """)

@@ -38,10 +38,10 @@ def design(virtual):
     if virtual is None:
         return None
     shape = virtual["trajectories"]
-    kept = {"lines": ("start_mm", "end_mm", "offsets_y_mm", "points"), "spiral": ("points",)}
+    searched_keys = {"lines": ("start_mm", "end_mm", "offsets_y_mm", "points"), "spiral": ("points",)}
     return {
         "motion": {key: virtual["motion"][key] for key in ("speed_mm_s", "acceleration_mm_s2")},
         "trajectories": {
-            name: {key: shape[name][key] for key in keys} for name, keys in kept.items() if shape.get(name)
+            name: {key: shape[name][key] for key in keys} for name, keys in searched_keys.items() if shape.get(name)
         },
     }

@@ -8,16 +8,16 @@ from scipy.signal import find_peaks
 
 from rrru.studies.rrru3.paper import ERRORS_MM, TABLE_5, TABLE_6
 
-# what the numbers need
+# trajectories that the numbers need
 TRAJECTORIES = {*(f"line_{k}" for k in range(1, 8)), "spiral"}
-# printed as "less than": reached when not above
+# printed as "less than": met when not above
 UPPER_LIMITS = ("spiral_under_lines_z_abs_max",)
-# a number is matched where it is off by no more
+# largest relative deviation of a matched number
 TOLERANCE = 0.15
 LINKS = ("dL1", "dL2", "dL3")
-# "nearly the same": not further apart than Tables 5 and 6 are
+# "nearly the same": the largest difference between Tables 5 and 6
 _LINKS_APART_MM = max(abs(TABLE_5[name] - TABLE_6[name]) for name in LINKS)
-# a peak of the error that is gone once errors lie in the printed range after calibration, 0.294 to 1.220 mm
+# least height of a peak that cannot be within the printed range after calibration, 0.294 to 1.220 mm
 SPIKE_MM = ERRORS_MM["group1_after_max"] - ERRORS_MM["group1_after_min"]
 # ASSUME "several": three, and "sharp": half of the height is within three of the 26 points
 SPIKES, SPIKE_POINTS = 3, 3.0
@@ -27,7 +27,7 @@ def study_numbers(trajectory, before_mm, under_lines_mm, under_spiral_mm):
     """Numbers of paper.ERRORS by item (without the objective), in mm, each (...).
 
     trajectory: (n,) names `line_1` to `line_7` and `spiral`; the others: error vectors (..., n, 3) before calibration
-    and under both calibrations, NaN where a point was not measured.
+    and after both calibrations, NaN where a point was not measured.
     """
     trajectory = np.asarray(trajectory)
     before, lines, spiral = (np.linalg.norm(e, axis=-1) for e in (before_mm, under_lines_mm, under_spiral_mm))
@@ -63,8 +63,8 @@ def matched(item, value, published):
 def group_orders(trajectory, before_mm, under_lines_mm, under_spiral_mm):
     """The paper's orders of the line groups as margins (...), positive where they hold: name to ratio - 1.
 
-    centre_*: the best mean error of groups 4-7 against the worst of groups 1-3; group6_*: the largest error of group 6
-    against that of the other groups; outer_*: the better mean error of groups 6 and 7 against the worst of the others.
+    centre_*: the least mean error of groups 4-7 over the largest of groups 1-3; group6_*: the largest error of group 6
+    over that of the other groups; outer_*: the smaller mean error of groups 6 and 7 over the largest of the others.
     """
     trajectory, margins = np.asarray(trajectory), {}
     for label, errors in (("before", before_mm), ("after", under_lines_mm), ("spiral", under_spiral_mm)):
@@ -88,8 +88,8 @@ def link_order(lines, spiral):
 def spike_orders(trajectory, before_mm, under_lines_mm):
     """Margins of the sharp spikes on group 1 that Fig. 9 shows before calibration only; errors (n, 3) of one draw.
 
-    spikes_before: the least of the SPIKES highest before calibration against SPIKE_MM; spikes_after: SPIKE_MM against
-    the highest that is left. Heights are prominences.
+    spikes_before: the least of the SPIKES highest before calibration over SPIKE_MM; spikes_after: SPIKE_MM compared
+    with the highest after it. Heights are prominences.
     """
     first = np.asarray(trajectory) == "line_1"
     before, after = (spikes(np.linalg.norm(errors[first], axis=-1)) for errors in (before_mm, under_lines_mm))

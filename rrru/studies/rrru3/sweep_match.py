@@ -1,4 +1,4 @@
-"""Which reading of the genetic algorithm comes nearest to Tables 3 and 4 of paper A, and whether it reproduces them."""
+"""Interpretation of the genetic algorithm nearest to Tables 3 and 4 of paper A, and whether it reproduces them."""
 
 import numpy as np
 import pandas as pd
@@ -18,34 +18,34 @@ _MIDDLE = (0.025, 0.975)
 def sweep_match(runs, seed=0):
     """Rows of `sweep_match`, one per SWEEP of a table of runs, whose values the paper prints.
 
-    A printed curve is a single run a value. It is reproduced where it is one of the curves that are drawn here, a run a
-    value: as far from the medians, its mean taken off, since the level belongs to the robot, and of such a range. Each
-    has to lie in the middle 95 % of the drawn ones. `seed` is of these draws.
+    A printed curve has a single run per value. It is reproduced if it is compatible with random curves of a single run
+    per value: its distance from the medians, without its mean, since the level depends on the robot, and its range both
+    have to be within the middle 95 % of those of random curves. `seed` is for these draws.
     """
     rows, runs = [], runs[np.isfinite(runs["objective_mm"])]
     for parameter, (table, printed) in PRINTED.items():
-        own = runs[(runs["parameter"] == parameter) & runs["value"].isin(printed)]
-        if own.empty:
+        swept = runs[(runs["parameter"] == parameter) & runs["value"].isin(printed)]
+        if swept.empty:
             continue
-        every = own.groupby(SWEEP)["value"].agg(set)
+        every = swept.groupby(SWEEP)["value"].agg(set)
         shared = sorted(set.intersection(*every))
-        found = [_row(group, key, printed, shared, seed) for key, group in own.groupby(SWEEP)]
+        found = [_row(group, key, printed, shared, seed) for key, group in swept.groupby(SWEEP)]
         nearest = min(row["distance_shared_mm"] for row in found)
         rows += [{"table": table, "nearest": row["distance_shared_mm"] == nearest} | row for row in found]
     return pd.DataFrame(rows)
 
 
 def _row(group, key, printed, shared, seed):
-    """One sweep beside the printed curve; shared: values that all sweeps of this table have."""
+    """One sweep compared with the printed curve; shared: values that all sweeps of this table have."""
     samples = {value: part.to_numpy() for value, part in group.groupby("value")["objective_mm"]}
     medians = np.array([np.median(sample) for sample in samples.values()])
     curve = np.array([printed[value] for value in samples])
-    distance = _apart(medians, curve)
+    distance = _centred_distance(medians, curve)
     generator = stream(seed, "sweep_match", *key)
     drawn = np.stack([generator.choice(sample, _CURVES) for sample in samples.values()], axis=1)
-    low, high = np.quantile(_apart(drawn, medians), _MIDDLE)
+    low, high = np.quantile(_centred_distance(drawn, medians), _MIDDLE)
     ranges = np.quantile(np.ptp(drawn, axis=1), _MIDDLE)
-    alike = low <= distance <= high and ranges[0] <= np.ptp(curve) <= ranges[1]
+    reproduced = low <= distance <= high and ranges[0] <= np.ptp(curve) <= ranges[1]
     common = np.isin(list(samples), shared)
     return dict(zip(SWEEP, key, strict=True)) | {
         "settings": len(samples),
@@ -54,17 +54,17 @@ def _row(group, key, printed, shared, seed):
         "distance_mm": float(distance),
         "chance_low_mm": float(low),
         "chance_high_mm": float(high),
-        "distance_shared_mm": float(_apart(medians[common], curve[common])),
+        "distance_shared_mm": float(_centred_distance(medians[common], curve[common])),
         "scatter_mm": float(np.median([np.ptp(sample) for sample in samples.values()])),
         "range_mm": float(np.ptp(medians)),
         "chance_range_low_mm": float(ranges[0]),
         "chance_range_high_mm": float(ranges[1]),
         "printed_range_mm": float(np.ptp(curve)),
-        "verdict": "reproduced" if alike else "not reproduced",
+        "verdict": "reproduced" if reproduced else "not reproduced",
     }
 
 
-def _apart(curves, curve):
-    """RMS distance (...) of curves (..., v) from a curve (v,), each taken from its mean."""
+def _centred_distance(curves, curve):
+    """RMS distance (...) of curves (..., v) from a curve (v,), each minus its mean."""
     difference = curves - curve
     return np.sqrt(np.mean((difference - difference.mean(axis=-1, keepdims=True)) ** 2, axis=-1))

@@ -62,7 +62,7 @@ class Twin:
     values: dict
 
     def robot_section(self):
-        """What is searched of a `virtual_robots:` entry."""
+        """The searched part of a `virtual_robots:` entry."""
         effects = {effect: {name: self.values[name] for name in names} for effect, names in _EFFECTS.items()}
         # a whole number of periods a turn
         effects["transmission_error"]["ratio"] = float(round(self.values["ratio"]))
@@ -70,9 +70,9 @@ class Twin:
         return {"errors": geometry, "effects": effects, "wobble_mm": self.values["wobble_mm"]}
 
     def trajectory_section(self):
-        """What is searched of a `trajectories:` entry: line offsets (7,) in y, 0, then pairs outwards, and the spiral.
+        """The searched part of a `trajectories:` entry: line offsets (7,) in y, 0, then pairs outwards, and the spiral.
 
-        Groups 2, 4, 6 lie on the side of the sign of `side`.
+        Groups 2, 4, 6 are on the side of the sign of `side`.
         """
         side = 1.0 if self.values["side"] >= 0.0 else -1.0
         outwards = np.cumsum([self.values[name] for name in _OFFSETS]).tolist()
@@ -83,8 +83,10 @@ class Twin:
 
     def trajectories(self, configured):
         """Seven lines and the spiral: those of a configured `trajectories:` entry with the searched values."""
-        own = self.trajectory_section()
-        return trajectories.from_config({shape: {**configured[shape], **own[shape]} for shape in ("lines", "spiral")})
+        searched = self.trajectory_section()
+        return trajectories.from_config(
+            {shape: {**configured[shape], **searched[shape]} for shape in ("lines", "spiral")}
+        )
 
     def robot(self, mechanism, kind=VirtualRobot):
         """The virtual robot of this candidate."""
@@ -100,7 +102,7 @@ class Twin:
 def from_config(virtual):
     """The configured twin: the virtual robot and the trajectories of a virtual campaign's section, as a Twin.
 
-    Raises ConfigError where these hold something that the search does not know.
+    Raises ConfigError where these have numbers that are not searched.
     """
     robot, lines, spiral = virtual["robot"], virtual["trajectories"]["lines"], virtual["trajectories"]["spiral"]
     offsets = lines["offsets_y_mm"]
@@ -114,12 +116,12 @@ def from_config(virtual):
         **{key: spiral[key] for key in ("turns", "start_deg")},
     }
     if other := sorted(set(values) ^ set(SEARCH_BOUNDS)):
-        raise ConfigError(f"twin: campaign {virtual['name']} differs in {other} from what is searched")
+        raise ConfigError(f"twin: campaign {virtual['name']} differs in {other} from the searched numbers")
     return Twin({name: float(values[name]) for name in SEARCH_BOUNDS})
 
 
 def numbers(virtual):
-    """Rows of `twin_numbers` of a virtual campaign's section; none where it is not what the search knows."""
+    """Rows of `twin_numbers` of a virtual campaign's section; none where it does not have the searched numbers."""
     columns, shapes = ["name", "value", "low", "high", "at_bound"], virtual["trajectories"]
     seven = "spiral" in shapes and len(shapes.get("lines", {}).get("offsets_y_mm", ())) == 7
     try:

@@ -1,12 +1,12 @@
-"""Search for a twin whose errors come as near as they can to the numbers that paper A prints.
+"""Search for a twin whose errors are as near as possible to the numbers that paper A prints.
 
-Searched: the 7 identifiable geometry errors, clearance and play per leg, a periodic drive error (amplitude and phase
-per leg, whole number of periods per turn), non-repeatability, the line groups' spacing and the spiral's shape.
-Nothing else: no number of the paper is fed into the simulation. What is compared is the median over draws of wobble and
-noise, so that the twin is a robot and not one lucky measurement. For speed the search solves eq. (8) with clearance to
-first order, which equals the spatial closure to micrometres as long as the axes are ideal, and calibrates on a
-linearised model, which is true to hundredths of a millimetre where it was calibrated. What it finds is then run and
-calibrated like every other campaign. Lengths in mm, angles in rad.
+Searched: the 7 identifiable geometry errors, clearance and backlash per leg, a periodic drive error (amplitude and
+phase per leg, whole number of periods per turn), non-repeatability, the line groups' spacing and the spiral's shape.
+No number of the paper enters the simulation. The comparison uses the median over draws of non-repeatability and noise,
+so that the result does not depend on a single draw. For speed the search solves eq. (8) with clearance to first order,
+which agrees with the spatial closure to micrometres for ideal axes. It calibrates on a linearised model, which is
+accurate to hundredths of a millimetre where it was calibrated. The result is then run and calibrated like every other
+campaign. Lengths in mm, angles in rad.
 """
 
 from dataclasses import dataclass, replace
@@ -26,7 +26,7 @@ from rrru.studies.rrru3.linear_fit import linear_fit
 from rrru.studies.rrru3.paper import ERRORS_MM
 from rrru.studies.rrru3.twin import SEARCH_BOUNDS, Twin
 
-# the spiral keeps clear of both singularities by this margin of the measures
+# least singularity measure on the spiral
 SPIRAL_MARGIN = 0.1
 # ASSUME the paper does not say which lines Table 5 was fitted on: "group_1" (26 points) or "lines" (all seven groups)
 LINE_CALIBRATIONS = ("group_1", "lines")
@@ -35,7 +35,7 @@ _line_run = cache(make_run)
 
 
 class TranslationalRobot(VirtualRobot):
-    """The same robot solved on eq. (8): only for ideal axes, where the platform does not turn."""
+    """The same robot solved on eq. (8): only for ideal axes, where the platform does not rotate."""
 
     def positions(self, motion, target):
         """Platform centres (n, 3); clearance to first order."""
@@ -50,7 +50,7 @@ class TranslationalRobot(VirtualRobot):
 
 @dataclass(frozen=True)
 class Task:
-    """What every candidate is driven through and calibrated with.
+    """The campaign and the calibration of every candidate.
 
     motion, trajectories: sections of the configuration; draws: see `draw`; line_calibration: one of LINE_CALIBRATIONS.
     Raises ConfigError for another one.
@@ -72,7 +72,7 @@ class Task:
         """Plan of a candidate: seven lines and the spiral, each once."""
         *lines, spiral = twin.trajectories(self.trajectories)
         speed, acceleration = self.motion["speed_mm_s"], self.motion["acceleration_mm_s2"]
-        # the first line is every candidate's, the other groups' are the same, shifted
+        # the first line is the same for every candidate; the other groups are shifted copies
         first, runs = _line_run(lines[0], speed, acceleration), []
         for line in lines:
             shift = np.subtract(line.start_mm, lines[0].start_mm)
@@ -109,17 +109,18 @@ def simulate(task, twin, kind=TranslationalRobot):
     fits = [linear_fit(mechanism, theta[rows], measured[:, rows], target[rows]) for rows in (calibrated, curve)]
     lines, spiral = (_corrected(robot, plan, motion, deviations) + again - target for deviations, _ in fits)
     errors = measured - target, lines, spiral
-    if not all(np.isfinite(one).all() for one in errors):
-        raise UnreachableError("the candidate leaves its reach")
+    if not all(np.isfinite(errors_mm).all() for errors_mm in errors):
+        raise UnreachableError("the candidate leaves its workspace")
     names = [mechanism.parameters.names.index(name) for name in numbers.LINKS]
     orders = numbers.group_orders(trajectory, *errors) | numbers.link_order(*(fit[:, names] for fit, _ in fits))
     return numbers.study_numbers(trajectory, *errors) | {"lines_objective": fits[0][1]}, orders
 
 
 def _corrected(robot, plan, motion, deviations):
-    """Positions (d, n, 3) attained with commands corrected by deviations (d, p), before anything random.
+    """Positions (d, n, 3) attained with commands corrected by deviations (d, p), without random errors.
 
-    Driven with the draws' mean; to first order from there. motion: of the nominal commands, whose loads are the same.
+    Exact for the mean deviations of the draws, to first order about it. motion: of the nominal commands, whose loads
+    are the same.
     """
     mechanism, target, mean = robot.mechanism, plan.targets(), deviations.mean(axis=0)
     path, index = plan.path()
@@ -138,11 +139,11 @@ def _require_clear(mechanism, position, theta):
 
 
 def misfit(found, orders):
-    """How far a candidate is from the paper: what exceeds a deviation of 8 %, in units of 7 %, to the fourth power.
+    """Misfit of a candidate: the sum of the fourth powers of deviations beyond 8 %, in units of 7 %.
 
     found, orders: numbers and margins (d,) by name, of which the medians count. A deviation of 15 % counts 1, one of
-    22 % 16 and each 7 % beyond 4 more: what cannot be had is given up for the rest. Broken orders add to it: one counts
-    while its margin is below 1.5 %, 9 where it is none, and little more beyond.
+    22 % counts 16, and each further 7 % counts 4, so that unreachable numbers do not dominate. Orders add a penalty
+    while their margin is below 1.5 %: 9 at zero margin, and little more for a negative one.
     """
     total = 0.0
     for item, published in ERRORS_MM.items():
@@ -151,7 +152,7 @@ def misfit(found, orders):
         off = max(deviation - 0.08, 0.0) / 0.07
         total += min(off, 2.0) ** 4 + 4.0 * max(off - 2.0, 0.0)
     short = [max(0.015 - np.median(margin), 0.0) / 0.005 for margin in orders.values()]
-    return total + sum(min(one, 3.0) ** 2 + 0.05 * max(one - 3.0, 0.0) for one in short)
+    return total + sum(min(lack, 3.0) ** 2 + 0.05 * max(lack - 3.0, 0.0) for lack in short)
 
 
 def _twin(vector):
@@ -171,9 +172,9 @@ def cost(vector, task):
 def search(task, section, start=None, workers=1, callback=None):
     """Differential evolution over SEARCH_BOUNDS; returns (Twin, misfit).
 
-    section: the configuration's `twin`, whose population is per searched number; start: a Twin to begin around, within
-    its `share` of the bounds' width (1 sigma), instead of anywhere. The same seed gives the same twin on any number of
-    workers.
+    section: the configuration's `twin`, whose population is per searched number; start: a Twin as the centre of the
+    first generation, with a spread of `share` times the bounds' width (1 sigma), instead of the whole bounds. The same
+    seed gives the same twin on any number of workers.
     """
     from scipy.optimize import differential_evolution
 

@@ -88,14 +88,14 @@ def test_a_random_run_is_as_long_as_the_advised_one(robot):
 
 
 def test_what_is_unsure_beside_rivals_is_ambiguous():
-    told = [
+    verdict_rows = [
         ("label", "sure", 0.95, "backlash", "line_1"),
         ("label", "no rival", 0.5, "", ""),
         ("label", "rival", 0.5, "backlash", ""),
         ("effect", "without its effect", 0.5, "backlash", ""),
         ("label", "advised", 0.5, "", "line_1"),
     ]
-    verdicts = pd.DataFrame(told, columns=["check", "robot", "probability", "confusable_with", "next_runs"])
+    verdicts = pd.DataFrame(verdict_rows, columns=["check", "robot", "probability", "confusable_with", "next_runs"])
     assert advice.ambiguous(verdicts, 20) == ["rival", "advised"] and advice.ambiguous(verdicts, 1) == ["rival"]
 
 
@@ -105,9 +105,9 @@ def test_advice_is_followed_and_counted(robot, monkeypatch):
     known = MeasuredRobot(make_mechanism("rrru3", {}), CONDITIONS.masses, CONDITIONS.noise_mm, robot.name)
     library = GapSettings()
     measurements = robot.measured(CONDITIONS)
-    told = [pd.DataFrame(advice.follow(robot, measurements, CONDITIONS, known, library)) for _ in range(2)]
-    pd.testing.assert_frame_equal(*told)
-    table = check("withheld_advice", told[0])
+    followed = [pd.DataFrame(advice.follow(robot, measurements, CONDITIONS, known, library)) for _ in range(2)]
+    pd.testing.assert_frame_equal(*followed)
+    table = check("withheld_advice", followed[0])
     assert table["round"].tolist() == [1, 2] and (table["random_run"] != "").all() and not table["settled_random"].any()
     assert table["truth"].unique().tolist() == ["drive_compliance"]
     followed = pd.concat([table.assign(robot=f"{k}", settled_advised=k < 3, kind="run") for k in range(4)])

@@ -1,4 +1,4 @@
-"""Statements on single causes beside the truth: what is stated, what is counted, and how good probabilities are."""
+"""Statements on single causes compared with the truth: stated, counted, and calibration of probabilities."""
 
 from dataclasses import replace
 from types import SimpleNamespace

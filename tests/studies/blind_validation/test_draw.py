@@ -18,7 +18,7 @@ from rrru.simulation.virtual_robot import VirtualRobot
 from rrru.studies.blind_validation import draw
 from rrru.studies.blind_validation.chunks import Member, check, chunks, noise_of
 from rrru.studies.blind_validation.members import robot_of
-from rrru.studies.blind_validation.noise import NOISES, NoiseLaw
+from rrru.studies.blind_validation.noise import NOISES, NoiseModel
 from rrru.studies.blind_validation.oracle import limits, with_truth
 from rrru.studies.blind_validation.outside import EFFECTS, OUTSIDE
 from rrru.studies.blind_validation.robots import noise_free, true_gap_mm
@@ -63,11 +63,11 @@ def test_a_robot_is_its_seed_and_survives_as_text(number):
 @pytest.mark.parametrize("effect", EFFECTS)
 def test_an_effect_is_as_strong_as_the_answer_says(effect):
     robot = draw.draw(Member("effect", effect, 0), replace(CONDITIONS, seed=5))
-    told = robot.answer(CONDITIONS)
-    assert told["truth"] == effect and 2.0 <= told["strength"] <= 10.0
+    answer = robot.answer(CONDITIONS)
+    assert answer["truth"] == effect and 2.0 <= answer["strength"] <= 10.0
     measurements, truth = replace(robot.campaign(CONDITIONS), noise_mm=0.0).run()
     _, gap = _calibrated(measurements)
-    np.testing.assert_allclose(gap / CONDITIONS.noise_rms_mm, told["strength"], rtol=1e-3)
+    np.testing.assert_allclose(gap / CONDITIONS.noise_rms_mm, answer["strength"], rtol=1e-3)
     np.testing.assert_array_equal(rows.measured(measurements), truth[[f"true_{axis}_mm" for axis in "xyz"]])
 
 
@@ -138,7 +138,7 @@ def test_deviations_alone_leave_no_gap():
 
 
 @pytest.mark.parametrize("name", OUTSIDE)
-def test_a_cause_from_outside_is_physical_and_nothing_in_the_library_imitates_it(name):
+def test_a_cause_from_outside_is_physical_and_no_effect_of_the_library_is_confounded_with_it(name):
     robot = bare(0, "full")
     acting = _acting(robot, name)
     robot = replace(robot, acting=(acting,))
@@ -149,7 +149,7 @@ def test_a_cause_from_outside_is_physical_and_nothing_in_the_library_imitates_it
     moved, _ = virtual.positions(motion, motion.position_mm)
     still, _ = VirtualRobot(mechanism=_MECHANISM).positions(motion, motion.position_mm)
     at = _MECHANISM.map_at(motion.drive, motion.position_mm)
-    first = at.move(acting.law.contribute(motion, acting.values).twists)
+    first = at.move(acting.effect_model.contribute(motion, acting.values).twists)
     np.testing.assert_allclose(moved - still, first, atol=0.02 * np.abs(first).max())
     measurements, _ = campaign.run()
     deviations, _ = _calibrated(measurements)
@@ -194,7 +194,7 @@ def test_robots_as_they_are_have_one_to_six_causes_and_noise_that_is_not_as_stat
         return name
 
     monkeypatch.setattr(draw, "draw_acting", drawn)
-    counts, outside, laws = Counter(), 0, Counter()
+    counts, outside, noises = Counter(), 0, Counter()
     for number in range(900):
         robot = draw.draw(Member("as_robots_are", "", number), CONDITIONS)
         (axes,) = robot.background
@@ -204,11 +204,11 @@ def test_robots_as_they_are_have_one_to_six_causes_and_noise_that_is_not_as_stat
         outside += len(robot.acting) - len(own)
         counts[len(own)] += 1
         assert 0.0 <= robot.noise["scatter"] <= draw.MOST_SCATTER
-        laws[tuple(sorted(robot.noise.keys() - {"scatter"}))] += 1
+        noises[tuple(sorted(robot.noise.keys() - {"scatter"}))] += 1
     assert spans == {(0.3, 30.0)} and outside == 300
     assert set(counts) == {1, 2, 3, 4, 5, 6} and chisquare(list(counts.values())).pvalue > 1e-3
     # smaller or larger by a number, axes, along a run, of runs, tails, and scatter alone
-    assert set(laws) == {("size",), ("axes",), ("correlation",), ("runs",), ("freedom",), ()}
+    assert set(noises) == {("size",), ("axes",), ("correlation",), ("runs",), ("freedom",), ()}
 
 
 def test_causes_of_a_robot_as_they_are_are_as_strong_as_they_say():
@@ -223,8 +223,8 @@ def test_causes_of_a_robot_as_they_are_are_as_strong_as_they_say():
     assert robot.background[0].strength > 0.0
     # what is read is off by more than the exact places are
     off = rows.measured(robot.measured(CONDITIONS)) - rows.measured(noise_free(robot, CONDITIONS))
-    law = NoiseLaw(**robot.noise)
-    own = (law.size * np.array(law.axes)) ** 2 + law.scatter**2 + law.runs**2
+    noise = NoiseModel(**robot.noise)
+    own = (noise.size * np.array(noise.axes)) ** 2 + noise.scatter**2 + noise.runs**2
     np.testing.assert_allclose(off.std(axis=0) / CONDITIONS.noise_mm, np.sqrt(own), rtol=0.35)
 
 

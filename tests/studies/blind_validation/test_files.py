@@ -15,13 +15,13 @@ from rrru.studies.blind_validation.chunks import Member
 from rrru.studies.blind_validation.draw import MANY
 from rrru.studies.blind_validation.faults import KINDS, Fault, draw_fault, kinds_of
 from rrru.studies.blind_validation.members import drawn, robot_of
-from rrru.studies.blind_validation.noise import NoiseLaw
+from rrru.studies.blind_validation.noise import NoiseModel
 from rrru.studies.blind_validation.parts import parts
 from rrru.studies.blind_validation.plants import mujoco
 from rrru.studies.blind_validation.verdicts import NONE, PREFIX
 from tests.studies.blind_validation.files import FILES, conditions, short
 
-# of these MuJoCo and our laws say the same, but for what friction does besides: (file, kind), share
+# MuJoCo and our effect models agree on these, except for friction: (file, kind), share
 _ALIKE = (
     ("hexapod_file", "soft_servo", 0.02),
     ("hexapod_file", "slow_servo", 0.01),
@@ -85,9 +85,9 @@ def test_the_right_answer_is_a_law_that_the_diagnosis_tries_or_none(kind):
         gap = np.linalg.norm(foreign.residual(foreign.noise_free(own, conditions(file)), conditions(file)), axis=1)
         assert gap.max() < 0.1 * conditions(file).noise_mm
     else:
-        law, values = fault.values(robot)
-        assert fault.truth == fault.effect == law.name == KINDS[kind].answer
-        assert fault.numbers(robot) == ({} if "load_kg" in fault.more else {law.name: values})
+        effect, values = fault.values(robot)
+        assert fault.truth == fault.effect == effect.name == KINDS[kind].answer
+        assert fault.numbers(robot) == ({} if "load_kg" in fault.more else {effect.name: values})
 
 
 def test_one_place_means_that_place_alone():
@@ -109,12 +109,12 @@ def test_a_robot_is_its_seed_as_strong_as_it_says_and_survives_as_text():
     assert robot == again and measurements.equals(same)
     assert robot.cause == "soft_servo" and robot.truth == "drive_compliance"
     (fault,) = robot.acting
-    # the last step towards it is along a law that is linear
+    # the last step towards it is along a linear effect
     assert 0.9 * foreign.WEAKEST < fault.strength < 1.1 * foreign.STRONGEST
     twice = foreign.as_driven(replace(robot, acting=(fault.scaled(2.0),)), known)[0].acting[0]
     np.testing.assert_allclose(twice.strength, 2.0 * fault.strength, rtol=0.02)
-    told = robot.answer(known)
-    assert robot_of(told["drawn"]) == robot and json.loads(told["drawn"])["plant"] == "own"
+    answer = robot.answer(known)
+    assert robot_of(answer["drawn"]) == robot and json.loads(answer["drawn"])["plant"] == "own"
     # what it leaves in the noise-free residual is what the oracle finds in the noisy one
     count = len(measurements) * 3 * fault.strength**2
     np.testing.assert_allclose(robot.oracle_chi2, count, rtol=0.2)
@@ -136,19 +136,19 @@ def test_a_campaign_has_what_tells_causes_apart_and_fresh_runs_go_elsewhere():
 def test_a_fault_that_the_calibration_takes_up_cannot_be_sized():
     """Legs that always push never change sides of their clearance: it is a length."""
     fault = Fault("clearance", (0.1,) * 6, {})
-    with pytest.raises(UnreachableError, match="a calibration takes up clearance"):
+    with pytest.raises(UnreachableError, match="a calibration absorbs clearance"):
         foreign.sized(short("own", "hexapod_file"), fault, 3.0, conditions("hexapod_file"))
 
 
 def test_a_fault_that_nobody_has_is_none():
     """A drive's compliance of a size beyond its parameter's bound."""
     known = conditions("arm6_file")
-    law = find("drive_compliance", known.mechanism)
-    most = law.parameters.parameters[0].high
+    effect = find("drive_compliance", known.mechanism)
+    most = effect.parameters.parameters[0].high
     assert Fault("soft_servo", (1.01 * most, 0.0, 0.0, 0.0, 0.0, 0.0), {}).beyond(known.mechanism)
     assert not Fault("soft_servo", (0.99 * most, 0.0, 0.0, 0.0, 0.0, 0.0), {}).beyond(known.mechanism)
     assert Fault("base_on_springs", (1.0, 1.0, 0.0, 0.0), {}).beyond(known.mechanism)
-    # the library has no law of it, and so no bound
+    # the library has no effect model of it, and so no bound
     assert not Fault("speed_friction", (10.0,) * 6, {}).beyond(known.mechanism)
 
 
@@ -164,9 +164,9 @@ def test_a_robot_of_a_file_as_robots_are_has_several_causes_of_its_own(file, num
         assert 0.9 * MANY[0] < one.strength < 1.1 * MANY[1]
         alone = foreign.gap_over_noise(replace(robot, acting=(one,)), known)
         np.testing.assert_allclose(alone, one.strength, rtol=1e-9)
-    told = robot.answer(known)
-    assert robot_of(told["drawn"]) == robot and told["weakest"] == min(one.strength for one in robot.acting)
-    assert told["truth"] == "+".join(sorted(one.truth for one in robot.acting))
+    answer = robot.answer(known)
+    assert robot_of(answer["drawn"]) == robot and answer["weakest"] == min(one.strength for one in robot.acting)
+    assert answer["truth"] == "+".join(sorted(one.truth for one in robot.acting))
     assert set(robot.numbers(known)) == {one.effect for one in robot.acting if not one.outside}
     # noise as it was drawn, beyond the stated one
     off = rows.measured(measurements) - rows.measured(foreign.noise_free(robot, known))
@@ -174,7 +174,7 @@ def test_a_robot_of_a_file_as_robots_are_has_several_causes_of_its_own(file, num
     listed = parts(robot, "none", _budget(), known.noise_rms_mm).set_index("part")
     for one in robot.acting:
         assert listed.loc[one.effect, "strength"] == one.strength
-    assert listed.loc["scatter", "strength"] == NoiseLaw(**robot.noise).beyond
+    assert listed.loc["scatter", "strength"] == NoiseModel(**robot.noise).beyond
 
 
 def test_axes_of_a_robot_of_a_file_as_robots_are_are_found_by_its_calibration():

@@ -9,7 +9,7 @@ import pytest
 from rrru.campaign import measurements as rows
 from rrru.diagnosis.diagnose import MeasuredRobot, diagnose
 from rrru.diagnosis.settings import GapSettings
-from rrru.studies.blind_validation.noise import NOISES, NoiseLaw
+from rrru.studies.blind_validation.noise import NOISES, NoiseModel
 from rrru.studies.blind_validation.parts import is_enough, parts
 from rrru.studies.blind_validation.robots import Acting, noise_free
 from rrru.studies.blind_validation.summary import summary
@@ -89,14 +89,14 @@ def test_an_effect_that_was_taken_out_counts_as_from_outside():
     assert table.loc["unexplained", "strength"] == 3.0
 
 
-@pytest.mark.parametrize("law", [*NOISES.values(), NoiseLaw(size=0.5, scatter=3.0)])
-def test_what_lies_beyond_the_stated_noise_is_what_is_drawn(law):
+@pytest.mark.parametrize("noise", [*NOISES.values(), NoiseModel(size=0.5, scatter=3.0)])
+def test_what_lies_beyond_the_stated_noise_is_what_is_drawn(noise):
     """Without offsets of runs: the excess of the drawn variances over the stated ones."""
     measurements = pd.DataFrame({"run": np.repeat(np.arange(400), 100)})
-    law = replace(law, runs=0.0, freedom=np.inf)
-    drawn = law.draw(measurements, 2.0, np.random.default_rng(4))
+    noise = replace(noise, runs=0.0, freedom=np.inf)
+    drawn = noise.draw(measurements, 2.0, np.random.default_rng(4))
     excess = np.maximum((drawn**2).mean(axis=0) - 4.0, 0.0)
-    np.testing.assert_allclose(2.0 * law.beyond, np.sqrt(excess.mean()), rtol=0.05, atol=0.4)
+    np.testing.assert_allclose(2.0 * noise.beyond, np.sqrt(excess.mean()), rtol=0.05, atol=0.4)
 
 
 def _listed(*entries):
@@ -184,7 +184,7 @@ def test_noises_are_counted_one_by_one_and_together():
         ("one effect, along_50", named): (1, 1.0, 0.92),
         ("one effect, any noise", named): (1, 1.0, 0.92),
         ("nothing acts but axis errors", "answered none or joint_axis_error"): (1, 1.0, 0.95),
-        ("one effect besides", "named exactly, with or without joint_axis_error"): (1, 0.0, 0.92),
+        ("one effect and axis errors", "named exactly, with or without joint_axis_error"): (1, 0.0, 0.92),
     }
     for key, values in expected.items():
         np.testing.assert_allclose(table.loc[key, ["robots", "value", "asked"]].astype(float), values, err_msg=str(key))

@@ -19,7 +19,7 @@ from rrru.studies.blind_validation.members import Known
 from rrru.studies.blind_validation.oracle import limits, with_truth
 from rrru.studies.blind_validation.outside import EFFECTS
 from rrru.studies.blind_validation.robots import noise_free
-from rrru.studies.blind_validation.score import _known, score_chunk
+from rrru.studies.blind_validation.score import _rivals, score_chunk
 from rrru.studies.blind_validation.states import state_of, state_row
 from rrru.studies.blind_validation.summary import calibration_error, confusion, summary, wilson
 from rrru.studies.blind_validation.verdicts import is_right
@@ -55,12 +55,12 @@ def _scored(robots, verdicts, states):
     answers = pd.DataFrame([robot.answer(CONDITIONS) for robot, _, _ in robots.values()])
     measurements = pd.concat([frame.assign(robot=name) for name, (_, frame, _) in robots.items()])
     base = {"check": "label", "probability": 0.9, "share_closed": 0.5}
-    told = pd.DataFrame([base | {"robot": name} | verdict for name, verdict in verdicts.items()])
-    told = answers[["robot", "kind"]].merge(told, on="robot")
+    joined = pd.DataFrame([base | {"robot": name} | verdict for name, verdict in verdicts.items()])
+    joined = answers[["robot", "kind"]].merge(joined, on="robot")
     corrected = pd.DataFrame([state_row(name, *state, _LIBRARY) for name, state in states.items()])
     budget = pd.DataFrame([{"robot": name} | _PART for name in robots])
     stated = pd.DataFrame([{"robot": name} | _STATED for name in robots])
-    scored = score_chunk(answers, measurements, told, stated, corrected, budget, {"": Known(CONDITIONS)})
+    scored = score_chunk(answers, measurements, joined, stated, corrected, budget, {"": Known(CONDITIONS)})
     for name, frame in scored._asdict().items():
         check(f"withheld_{name}", frame)
     assert scored.causes.set_index("robot")["acts"].equals(pd.Series({name: name == "faulty" for name in robots}))
@@ -99,9 +99,9 @@ def test_many_causes_are_scored_by_their_parts_and_have_no_limits(robots, effect
 
 def test_what_holds_an_effect_goes_with_it():
     library = {name: _LIBRARY[name] for name in ("leg_asymmetry", "joint_axis_error", "backlash")}
-    assert _known(library, "leg_asymmetry") == ["backlash"]
+    assert _rivals(library, "leg_asymmetry") == ["backlash"]
     many = {"drive_error_function", "transmission_orders"}
-    assert set(_known(_LIBRARY, "")) == set(_LIBRARY) - many
+    assert set(_rivals(_LIBRARY, "")) == set(_LIBRARY) - many
 
 
 @pytest.mark.parametrize(
@@ -148,14 +148,14 @@ def test_states_survive_as_text():
         {"thermal_growth": {"time_constant": 1 / 7}},
     )
     fitted = _LIBRARY | {"transmission_orders": _LIBRARY["transmission_orders"].with_waves(((2, 7.25),))}
-    calibrated, again, laws = state_of(state_row("a", [0.5, 0.25], state, fitted), _LIBRARY)
+    calibrated, again, effects = state_of(state_row("a", [0.5, 0.25], state, fitted), _LIBRARY)
     np.testing.assert_array_equal(calibrated, [0.5, 0.25])
     np.testing.assert_array_equal(again.deviations, state.deviations)
     assert set(again.effects) == set(state.effects) and again.shape_values == state.shape_values
     assert all((again.effects[key] == value).all() for key, value in state.effects.items())
-    assert laws["transmission_orders"].waves == ((2, 7.25),)
-    assert laws["transmission_orders"].parameters.names == ("sine_3_7.25", "cosine_3_7.25")
-    assert len(laws["drive_error_function"].coordinates) == 3 * 2 * 7 and laws["backlash"] is _LIBRARY["backlash"]
+    assert effects["transmission_orders"].waves == ((2, 7.25),)
+    assert effects["transmission_orders"].parameters.names == ("sine_3_7.25", "cosine_3_7.25")
+    assert len(effects["drive_error_function"].coordinates) == 3 * 2 * 7 and effects["backlash"] is _LIBRARY["backlash"]
 
 
 def test_the_oracle_alarms_falsely_once_in_a_hundred(robots):

@@ -287,7 +287,7 @@ def _page(sentences=(), notes=(), read=()):
     return [claim for texts, known in patterns for text in texts for claim in claims._of_text(text, known)]
 
 
-def test_sentences_are_told_apart():
+def test_sentences_have_distinct_kinds():
     cause = (
         "74 % of that (95 %: 60 % to 80 %) is encoder eccentricity at q3, amplitude3 = 0.000176 rad (95 %: 0.000148 "
         "to 0.000204), phase3 = phase4 = -0.59 rad (95 %: -0.79 to -0.39): the encoder's disc sits off its shaft's "
@@ -372,7 +372,7 @@ def test_files_are_read_again_without_the_package(tmp_path, kind, form):
     file.write_text(robot.text(form))
     place, turn, _ = file_poses(file, SimpleNamespace(kind=form, nominal=robot), values, np.zeros(4))
     expected, turned = robot.poses(values)
-    # servos of an arm in an MJCF give way by less than a micrometre
+    # servos of an arm in an MJCF deflect by less than a micrometre
     np.testing.assert_allclose(place, expected, atol=2e-3)
     assert Rotation.from_matrix(turn.transpose(0, 2, 1) @ turned).magnitude().max() < 1e-5
 

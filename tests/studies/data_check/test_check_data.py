@@ -157,25 +157,25 @@ def test_a_file_that_holds_everything_costs_nothing(tmp_path):
 
 def test_what_lacks_times_is_named(tmp_path):
     said = " ".join(costs(checked(FIELD.drop(columns="time_s"), tmp_path)))
-    unseen = [part for part in said.split("cannot be seen: ")[1:] if "time_s" in part]
+    unseen = [part for part in said.split("not testable: ")[1:] if "time_s" in part]
     assert {word for word in ("thermal_growth", "servo_lag", "backlash") if any(word in part for part in unseen)} == {
         "thermal_growth",
         "servo_lag",
     }
 
 
-def test_what_is_driven_once_with_one_payload_is_told(tmp_path):
+def test_missing_repetitions_and_payloads_are_reported(tmp_path):
     once = FIELD[(FIELD["run"] == 1)]
     drive = once[[f"theta{k}_rad" for k in (1, 2, 3)]]
     same = [name for name in drive if (np.diff(drive[name]) > 0).all() or (np.diff(drive[name]) < 0).all()]
     assert same
     said = costs(checked(once, tmp_path))
-    for text in ("one payload", "no place is measured in two runs", "nobody states the noise"):
+    for text in ("one payload", "no place is measured in two runs", "noise_mm is not stated"):
         assert any(text in one for one in said), text
     assert any(one.startswith("always approached from one side") and all(name in one for name in same) for one in said)
 
 
-def test_too_few_points_for_a_diagnosis_are_told(tmp_path):
+def test_too_few_points_for_a_diagnosis_are_reported(tmp_path):
     assert costs(checked(FIELD.head(8), tmp_path))[0].startswith("no diagnosis: ")
 
 
@@ -245,7 +245,7 @@ def test_the_printed_overlay_is_the_proposed_one_whatever_the_file_is_called(ste
         (["data/field_01.csv", "--robot", "rrru3", "--commands", "nothere.csv"], "nothere.csv: got no such file"),
     ],
 )
-def test_what_cannot_be_checked_is_told_without_a_traceback(arguments, said, monkeypatch, capsys):
+def test_an_impossible_check_gets_a_message_without_a_traceback(arguments, said, monkeypatch, capsys):
     monkeypatch.chdir(ROOT)
     assert main(arguments) == 2
     assert said in capsys.readouterr().err
@@ -260,7 +260,7 @@ def test_what_cannot_be_checked_is_told_without_a_traceback(arguments, said, mon
 @example(data=b"\xfe\xff", ending=".csv")
 @example(data=b"\xfe\xff", ending=".txt")
 @example(data=b"\xef\xbb\xbf\n", ending=".csv")
-def test_any_file_at_all_is_told(data, ending, tmp_path, monkeypatch):
+def test_any_file_gets_a_report(data, ending, tmp_path, monkeypatch):
     monkeypatch.chdir(ROOT)
     path = Path(tmp_path, f"any{ending}")
     path.write_bytes(data)
@@ -295,6 +295,6 @@ def _two_targets(robot):
     places = np.array([[60.0, 10.0, 40.0], [-50.0, 40.0, 70.0]])
     seen = np.stack([poses.point(place) for place in places], axis=1).reshape(-1, 3)
     seen = seen + 0.01 * generator.standard_normal(seen.shape)
-    told = dict(zip(robot.parts.columns, np.repeat(drive, 2, axis=0).T, strict=True))
-    told |= {f"measured_{axis}_mm": column for axis, column in zip("xyz", seen.T, strict=True)}
-    return pd.DataFrame({"trajectory": "row", "target": ["a", "b"] * 60, **told})
+    columns = dict(zip(robot.parts.columns, np.repeat(drive, 2, axis=0).T, strict=True))
+    columns |= {f"measured_{axis}_mm": column for axis, column in zip("xyz", seen.T, strict=True)}
+    return pd.DataFrame({"trajectory": "row", "target": ["a", "b"] * 60, **columns})

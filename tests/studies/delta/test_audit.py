@@ -42,7 +42,7 @@ def test_what_distances_see_by_driving_the_robot_with_wrong_zeros():
     nominal, moved = seen(np.zeros(3)), seen(1e-2 * weak)
     stretch = 100.0 * np.sqrt(((moved[1] - nominal[1]) ** 2).mean())
     shift = 100.0 * np.sqrt(((moved[0] - nominal[0]) ** 2).sum(axis=1).mean())
-    assert _values("least seen combination") == pytest.approx((stretch, shift), rel=1e-3)
+    assert _values("least observable zero errors") == pytest.approx((stretch, shift), rel=1e-3)
 
 
 def test_what_wrong_lengths_leave_by_drawing_robots():

@@ -56,9 +56,9 @@ def test_numbers_are_the_lattice_s_up_to_its_origin():
         lattice = PITCH * np.column_stack([column - 9.0, row - 6.0, np.zeros(len(row))])
         points = lattice @ (Rotation.from_rotvec(tilt).as_matrix() @ DOWN).T + [0.0, 0.0, 500.0]
         image = CAMERA.project(points) + generator.normal(0.0, 0.05, (len(points), 2))
-        kept = generator.permutation(len(image))[: int(0.9 * len(image))]
-        number, known = vision.number_dots(image[kept])
-        shift = number - np.column_stack([column, row])[kept]
+        chosen = generator.permutation(len(image))[: int(0.9 * len(image))]
+        number, known = vision.number_dots(image[chosen])
+        shift = number - np.column_stack([column, row])[chosen]
         assert known.mean() > 0.95 and (shift[known] == shift[known][0]).all()
 
 
@@ -151,7 +151,7 @@ def test_places_are_joined_by_the_commands_as_far_as_half_a_pitch_allows():
 @pytest.mark.parametrize("image", [np.full((200, 300), 200, dtype=np.uint8), np.zeros((200, 300), dtype=np.uint8)])
 def test_an_image_without_a_lattice_is_named(image):
     image[50:60, 50:60] = 90
-    with pytest.raises(FitError, match=r"pose 7: \d+ dots make a lattice; allowed: at least 12"):
+    with pytest.raises(FitError, match=r"pose 7: \d+ dots are on a lattice; allowed: at least 12"):
         vision.read_dots(image, "pose 7")
 
 

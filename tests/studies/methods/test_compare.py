@@ -76,7 +76,7 @@ def test_the_richer_the_model_the_less_is_left(delta):
     inside = delta[1].query("test == 'inside'").set_index("method")["after_mean_mm"]
     noise = delta[0].noise_mm
     assert inside["least_squares_full"] < 3.0 * noise and inside["least_squares_full"] < 0.4 * inside["zero_offsets"]
-    # the drives' own errors taken out, the lengths' stay: offsets fitted to positions also take up a part of these
+    # the drives' errors are removed, those of the lengths stay: offsets fitted to positions also absorb a part of these
     assert inside["zero_offsets"] < inside["zero_offsets_images"] < delta[1]["before_mean_mm"].iloc[0]
     # a step measures each target with noise, and leaves that and the second order of the error
     assert 0.5 * noise < inside["jacobian_step"] < 4.0 * noise

@@ -1,4 +1,4 @@
-"""Printers drawn with a known truth: six rods solved in space by Newton, a probe beside the nozzle, a bent bed."""
+"""Printers drawn with a known truth: six rods solved in space by Newton, a probe with an offset, a bent bed."""
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -63,11 +63,11 @@ class Drawn:
         none = np.empty(0), np.empty((0, 2, 3))
         return Printer("drawn", "", *numbers, heights, drops, *none, np.empty((0, 2)) if probe is None else probe)
 
-    def probed(self, sets, noise_mm, generator, hand=2.0, zero_mm=0.05):
+    def probed(self, sets, noise_mm, generator, by_hand=2.0, zero_mm=0.05):
         """The printer with heights of sets: places (n, 2) of the nozzle and the probe's offset (2,).
 
-        noise_mm: of a probed height, hand times as much of one touched by hand; zero_mm: how well every probe's own
-        height is known.
+        noise_mm: of a probed height, by_hand times as much of one touched by by_hand; zero_mm: how well every probe's
+        own height is known.
         """
         drops, heights, probes = [], [], []
         robot = self.nominal().mechanism("heights")
@@ -78,7 +78,7 @@ class Drawn:
                 pose = self.pose(drop, start)
                 tip = pose[:, :3] + Rotation.from_rotvec(pose[:, 3:]).as_matrix() @ [*offset, 0.0]
                 drop = drop + (tip[:, 2] - self.bed_height(tip[:, 0], tip[:, 1]))[:, None]
-            drops.append(drop + generator.normal(0.0, noise_mm * (hand if touched else 1.0), len(drop))[:, None])
+            drops.append(drop + generator.normal(0.0, noise_mm * (by_hand if touched else 1.0), len(drop))[:, None])
             heights.append(np.full(len(drop), 0.0 if touched else generator.normal(0.0, zero_mm)))
             probes.append(np.tile(offset, (len(drop), 1)))
         # whole microsteps are finer than any noise here

@@ -1,4 +1,4 @@
-"""`rrru-printer`: what an owner is told, on the terminal and in the page, and how it ends."""
+"""`rrru-printer`: its answer on the terminal and in the page, and how it ends."""
 
 import json
 from dataclasses import replace
@@ -14,7 +14,7 @@ from tests.places import ROOT
 from tests.studies.printers.simulated_printers import DISTANCES, ENTRIES, LEVEL, SETTINGS, STEP, simulated
 
 
-def told(capsys, *arguments):
+def output_of(capsys, *arguments):
     """What is printed, and the code that it ends with."""
     try:
         command.main([str(one) for one in arguments])
@@ -34,7 +34,7 @@ def mine(tmp_path):
 
 
 def test_a_bad_reading_is_named_and_the_calibration_without_it_offered(mine, tmp_path, capsys):
-    text, code = told(capsys, mine, "--page", tmp_path / "page.html")
+    text, code = output_of(capsys, mine, "--page", tmp_path / "page.html")
     assert code == 0 and "suspicious reading: distance 8:" in text
     assert "calibration from all readings:" in text and "calibration without distance 8:" in text
     whole = printer_fit.fit_printer(DISTANCES, STEP, LEVEL).fitted
@@ -49,37 +49,37 @@ def test_a_bad_reading_is_named_and_the_calibration_without_it_offered(mine, tmp
     assert "distance 8" in page and not any("src" in one or "href" in one for _, one in tags)
 
 
-def test_a_printer_without_an_answer_is_told_beside_the_others(mine, tmp_path, capsys):
+def test_a_printer_without_an_answer_is_reported_with_the_others(mine, tmp_path, capsys):
     (tmp_path / "bad.cfg").write_text("[printer]\nkinematics: delta\n")
-    text, code = told(capsys, mine, tmp_path / "bad.cfg")
+    text, code = output_of(capsys, mine, tmp_path / "bad.cfg")
     assert code == 2 and "suspicious reading: distance 8" in text and "printer: delta_radius" in text
-    text, code = told(capsys, tmp_path / "nowhere.cfg")
+    text, code = output_of(capsys, tmp_path / "nowhere.cfg")
     assert "nowhere.cfg" in code and "No such file" in code and not text
-    _, code = told(capsys, mine, "--page", tmp_path / "no" / "page.html")
+    _, code = output_of(capsys, mine, "--page", tmp_path / "no" / "page.html")
     assert "cannot be written" in code
 
 
 def test_a_page_of_an_earlier_run_does_not_stay_beside_a_failure(mine, tmp_path, capsys):
     page = tmp_path / "page.html"
-    assert told(capsys, mine, "--page", page)[1] == 0 and "printer_22" in page.read_text()
+    assert output_of(capsys, mine, "--page", page)[1] == 0 and "printer_22" in page.read_text()
     mine.write_text(json.dumps(ENTRIES["printer_22"]))
-    _, code = told(capsys, mine, "--page", page)
+    _, code = output_of(capsys, mine, "--page", page)
     text = page.read_text()
     assert "put the mapping in [ ]" in code and "put the mapping in [ ]" in text and "printer_22" not in text
 
 
 def test_it_runs_in_any_folder_and_says_whose_settings_it_takes(mine, tmp_path, capsys, monkeypatch):
     (tmp_path / "config.yaml").write_text("printers: {level: 2.0}")
-    here, _ = told(capsys, mine)
+    here, _ = output_of(capsys, mine)
     monkeypatch.chdir(tmp_path)
-    assert told(capsys, mine)[0] == here
-    assert str(ROOT / "config.yaml") in "".join(told(capsys, "--help")[0].split())
+    assert output_of(capsys, mine)[0] == here
+    assert str(ROOT / "config.yaml") in "".join(output_of(capsys, "--help")[0].split())
     monkeypatch.setattr(command, "_CONFIG", tmp_path / "nowhere.yaml")
-    assert "nowhere.yaml: cannot be read" in told(capsys, mine)[1]
+    assert "nowhere.yaml: cannot be read" in output_of(capsys, mine)[1]
 
 
 def test_one_reading_1_mm_off_among_eleven_good_ones_is_suspicious_and_good_ones_are_not():
-    """As owners' calipers are: a tenth of a millimetre beside a probe of half that."""
+    """As owners' calipers are: a tenth of a millimetre, with a probe of half that."""
     found = alarms = 0
     for seed in range(12):
         printer = simulated(DISTANCES, np.zeros(9), 0.1, np.random.default_rng(seed), ratio=0.5)

@@ -1,4 +1,4 @@
-"""An effector that tilts: its law against six rods solved in space, and printers drawn with a known truth."""
+"""A tilted effector: its model against six rods solved in space, and printers drawn with a known truth."""
 
 import numpy as np
 import pytest
@@ -70,7 +70,7 @@ def test_one_place_of_the_probe_cannot_tell_and_what_can_is_said():
 def test_the_power_is_how_often_it_is_found():
     """Noise drawn again on the fitted printer, for the arm that shows its rods worst."""
     test = TiltTest(*(lambda fit: (fit, fit.printer.probe_mm))(drawn(4, np.zeros(3), sides(3), 1)), noise_mm=0.005)
-    own, generator, columns, size = test._own, np.random.default_rng(2), test.columns, 0.1
+    own, generator, columns, size = test._tilt_columns, np.random.default_rng(2), test.columns, 0.1
     worst = np.argmin((own.model.remainder(columns[:, None]) ** 2).sum(axis=0))
     readings = generator.normal(0.0, 0.005, (2000, len(columns))) + size * columns[:, worst]
     share = (own.test(readings.T[:, None])[0] < LIMIT).mean()

@@ -1,4 +1,4 @@
-"""What a printer's readings leave: causes told from noise, from each other and from a bad reading, or called
+"""What a printer's readings leave: causes separated from noise, from each other and from a bad reading, or called
 undecidable.
 """
 
@@ -35,25 +35,25 @@ RATIOS = np.geomspace(0.125, 2.0, 9)
 
 
 def slow_p(result, columns, ratio, without=None):
-    """F of columns (n, k) beside the calibration, by two linear fits of all readings but one, and the restricted
+    """F of columns (n, k) added to the calibration, by two linear fits of all readings except one, and the restricted
     likelihood of the larger fit by determinants (Harville, 1977), up to a factor.
     """
     heights, residuals = len(result.printer.height_mm), result.residuals
     weight = np.where(np.arange(len(residuals)) < heights, 1.0 / ratio, 1.0)
-    kept = np.delete(np.arange(len(residuals)), [] if without is None else [without])
+    used = np.delete(np.arange(len(residuals)), [] if without is None else [without])
     jacobian = (residuals.jacobian(result.fit.deviations)[:, 0] / residuals.root_weight[:, None] * weight[:, None])[
-        kept
+        used
     ]
-    readings = ((residuals.measured_mm - residuals.predicted_mm(result.fit.deviations)) * weight)[kept]
-    more = np.concatenate([jacobian, (columns * weight[:, None])[kept]], axis=1)
+    readings = ((residuals.measured_mm - residuals.predicted_mm(result.fit.deviations)) * weight)[used]
+    more = np.concatenate([jacobian, (columns * weight[:, None])[used]], axis=1)
     left = []
     for matrix in (jacobian, more):
         scaled = matrix / np.linalg.norm(matrix, axis=0)
         left.append(((readings - scaled @ np.linalg.lstsq(scaled, readings)[0]) ** 2).sum())
-    count, freedom = columns.shape[1], len(kept) - more.shape[1]
-    scaled = more / np.linalg.norm(more / weight[kept][:, None], axis=0)
+    count, freedom = columns.shape[1], len(used) - more.shape[1]
+    scaled = more / np.linalg.norm(more / weight[used][:, None], axis=0)
     likelihood = (
-        np.log(weight[kept]).sum() - 0.5 * np.linalg.slogdet(scaled.T @ scaled)[1] - 0.5 * freedom * np.log(left[1])
+        np.log(weight[used]).sum() - 0.5 * np.linalg.slogdet(scaled.T @ scaled)[1] - 0.5 * freedom * np.log(left[1])
     )
     return stats.f.sf((left[0] - left[1]) / count / (left[1] / freedom), count, freedom), likelihood
 
@@ -165,7 +165,7 @@ def test_seven_heights_decide_nothing(printer):
     ].explained_share == pytest.approx(1.0)
 
 
-def test_leaning_towers_are_found_with_distances_and_imitated_by_arms_in_heights():
+def test_leaning_towers_are_found_with_distances_and_confounded_with_arms_in_heights():
     """However many heights there are, arms of other lengths than saved leave nearly what leaning towers leave."""
     _, _, answers, diagnosis = diagnosed(simulated(DISTANCES, NINE, 0.005, np.random.default_rng(7), lean=LEAN))
     assert answers["tower_lean"].verdict == "found" and diagnosis == "tower_lean"
@@ -260,13 +260,13 @@ def test_what_is_said_to_be_detectable_passes_nine_times_of_ten(name):
     assert abs(np.mean(passed) - 0.9) < 4.0 * np.sqrt(0.9 * 0.1 / 200.0)
 
 
-def test_a_cause_that_is_always_imitated_is_never_found():
+def test_an_always_confounded_cause_is_never_found():
     evidence = evidence_of(DISTANCES)
-    assert [name for name in evidence.columns if evidence.always_imitated(name, SETTINGS["imitated_from"])][:2] == [
+    assert [name for name in evidence.columns if evidence.always_confounded(name, SETTINGS["imitated_from"])][:2] == [
         "caliper_scale",
         "caliper_offset",
     ]
-    assert not evidence.always_imitated("tower_lean", SETTINGS["imitated_from"])
+    assert not evidence.always_confounded("tower_lean", SETTINGS["imitated_from"])
     generator = np.random.default_rng(4)
     for offset_mm in (0.5, 2.0, 8.0):
         answers = diagnosed(simulated(DISTANCES, NINE, 0.01, generator, offset_mm=offset_mm))[2]

@@ -1,4 +1,4 @@
-"""Printers: the answer of another program found again, and foreign answers told apart."""
+"""Printers: the answer of another program found again, and foreign answers distinguished."""
 
 from dataclasses import replace
 
@@ -48,7 +48,7 @@ def test_why_an_answer_does_not_belong():
         "printer_20": "overwritten after the calibration: radius, angle_a, angle_b;",
         "printer_21": "overwritten after the calibration: radius, angle_a, angle_b;",
         "printer_28": "unknown",
-        "printer_29": "Z offset was applied after the calibration: all endstops are -0.025 mm off alike",
+        "printer_29": "Z offset was applied after the calibration: all endstops differ by -0.025 mm",
     }
     assert set(foreign) == set(words) and all(words[name] in text for name, text in foreign.items())
 
@@ -56,7 +56,7 @@ def test_why_an_answer_does_not_belong():
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        (lambda p: replace(p, height_mm=p.height_mm + 0.3), "all endstops are -0.300 mm off alike"),
+        (lambda p: replace(p, height_mm=p.height_mm + 0.3), "all endstops differ by -0.300 mm"),
         (
             lambda p: replace(p, endstop_mm=np.round(p.endstop_mm)),
             "overwritten after the calibration: endstop_a, endstop_b, endstop_c",
@@ -64,9 +64,9 @@ def test_why_an_answer_does_not_belong():
         (lambda p: replace(p, radius_mm=round(p.radius_mm)), "overwritten after the calibration: radius;"),
         (lambda p: replace(p, height_drop_mm=2.0 * p.height_drop_mm), "steps 0.5 times as long as the file says:"),
         (lambda p: replace(p, height_drop_mm=p.height_drop_mm * [1.0, 2.0, 1.0]), "says on tower b"),
-        (lambda p: replace(p, arm_mm=p.arm_mm - [0.0, 0.5, 0.0]), "344.500 mm being 345.000 mm: arm_b was changed"),
+        (lambda p: replace(p, arm_mm=p.arm_mm - [0.0, 0.5, 0.0]), "345.000 mm instead of 344.500 mm: arm_b was"),
         (lambda p: replace(p, height_drop_mm=p.height_drop_mm / 4.0), "steps 4 times as long"),
-        (lambda p: replace(p, arm_mm=p.arm_mm + 2.5), "347.500 mm being 345.000 mm: all arms were changed"),
+        (lambda p: replace(p, arm_mm=p.arm_mm + 2.5), "345.000 mm instead of 347.500 mm: all arms were changed"),
     ],
 )
 def test_what_an_owner_changed_afterwards_is_named(change, words):
@@ -86,7 +86,7 @@ def test_a_reading_that_was_changed_afterwards_is_named_with_what_it_was(printer
     found = saved_answers.reason(
         printer_fit.fit_printer(replace(printer, height_mm=heights, distance_mm=distances), STEP, LEVEL)
     )
-    assert f"{'height' if number < 7 else 'distance'} {at + 1} being {before:.3f} mm" in found
+    assert f"{'height' if number < 7 else 'distance'} {at + 1} with {before:.3f} mm" in found
 
 
 @pytest.mark.parametrize("printer", [HEIGHTS, DISTANCES], ids=["heights", "distances"])
@@ -185,7 +185,7 @@ def test_tables_fit_their_schemas_and_a_printer_without_an_answer_keeps_its_row(
         "unread": "unread",
         "printer_23": "printer_22",
     }
-    # one piece of evidence with six causes; errors of the calipers are always imitated, so no size of them is promised
+    # one piece of evidence with six causes; errors of the calipers are always confounded, without a detectable size
     # to show
     causes = frames["printer_causes"].set_index("cause")
     assert causes["limit"].to_numpy() == pytest.approx(0.05 / 6.0)
@@ -204,8 +204,8 @@ def test_a_mistyped_reading_in_a_real_file_is_flagged_and_said_to_be_changed():
     frames = printer_tables.tables([replace(DISTANCES, distance_mm=lengths)], SETTINGS)
     readings, row = frames["printer_readings"], frames["printers"].iloc[0]
     # the calibration that is offered is that of a file without the reading
-    kept = {field: np.delete(getattr(DISTANCES, field), 7, axis=0) for field in ("distance_mm", "distance_drop_mm")}
-    residuals = firmware.residuals_of(replace(DISTANCES, **kept))
+    others = {field: np.delete(getattr(DISTANCES, field), 7, axis=0) for field in ("distance_mm", "distance_drop_mm")}
+    residuals = firmware.residuals_of(replace(DISTANCES, **others))
     residuals = replace(residuals, height_weight=firmware.residuals_of(DISTANCES).height_weight)
     others = firmware.own_numbers(residuals.mechanism, calibrate(residuals).deviations)[0]
     np.testing.assert_allclose(frames["printer_parameters"]["without_suspect"], others, atol=1e-6)
@@ -215,7 +215,7 @@ def test_a_mistyped_reading_in_a_real_file_is_flagged_and_said_to_be_changed():
         and row["cause"].startswith("bad_reading")
         and row["verdict"] == "does not belong"
     )
-    assert f"distance 8 being {DISTANCES.distance_mm[7]:.3f} mm" in row["reason"]
+    assert f"distance 8 with {DISTANCES.distance_mm[7]:.3f} mm" in row["reason"]
 
 
 def reason(printer):
@@ -237,9 +237,9 @@ def test_changed_steps_are_found_on_every_printer_with_a_z_offset_too(factor):
 @pytest.mark.parametrize("printer", [HEIGHTS, DISTANCES], ids=["heights", "distances"])
 def test_what_was_changed_is_named_beside_a_z_offset_in_klippers_rounding(printer):
     moved = replace(printer, endstop_mm=np.round(printer.endstop_mm + 0.06, 3))
-    assert reason(moved) == "a Z offset was applied after the calibration: all endstops are +0.060 mm off alike"
+    assert reason(moved) == "a Z offset was applied after the calibration: all endstops differ by +0.060 mm"
     found = reason(steps.with_steps(moved, np.full(3, 0.5)))
-    assert "steps 2 times as long" in found and "endstops are +0.060 mm off alike" in found
+    assert "steps 2 times as long" in found and "endstops differ by +0.060 mm" in found
     arm = moved.arm_mm - [0.0, 0.0, 0.5]
     found = reason(replace(moved, arm_mm=arm))
-    assert "arm_c" in found and "endstops are +0.060 mm off alike" in found and "arm_a" not in found
+    assert "arm_c" in found and "endstops differ by +0.060 mm" in found and "arm_a" not in found

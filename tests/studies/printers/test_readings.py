@@ -139,7 +139,7 @@ def test_wrong_distances_are_refused_too(place, value, words, tmp_path):
         ("{not json", "no JSON"),
         ("[]", "a list of at least one printer"),
         ('{"id": "mine"}', r"put the mapping in \[ \]"),
-        ([CONTENT[0], CONTENT[0]], "an id that several printers have"),
+        ([CONTENT[0], CONTENT[0]], "an id of several printers"),
         ([{"heights": []}], "number 1: id"),
     ],
 )

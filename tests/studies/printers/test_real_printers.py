@@ -21,9 +21,9 @@ def test_what_is_known_of_them_is_said():
     foreign = frame[frame["verdict"] == "does not belong"]
     assert set(foreign.index) == {*OFFSETS, "jjsimp_01"} and (frame["verdict"] != "not fitted").all()
     for name, size in OFFSETS.items():
-        assert "Z offset" in foreign.loc[name, "reason"] and f"are {size} mm off alike" in foreign.loc[name, "reason"]
+        assert "Z offset" in foreign.loc[name, "reason"] and f"differ by {size} mm" in foreign.loc[name, "reason"]
     assert foreign["reason"].str.contains("steps 2 times").sum() == 1
-    assert "214.500 mm being 215.000 mm: arm_b" in foreign.loc["jjsimp_01", "reason"]
+    assert "215.000 mm instead of 214.500 mm: arm_b" in foreign.loc["jjsimp_01", "reason"]
     suspects = frame.loc[frame["suspect"] != "", "suspect"].to_dict()
     assert suspects == {"aieie_05": "distance 12", "dothebart_02": "distance 12"}
 

@@ -23,8 +23,8 @@ def session(heights, wrong=(0.0, 0.0, 0.0)):
         f"M666 X{wrong[0]} Y{wrong[1]} Z{wrong[2]} ; endstops",
     ]
     lines += ["G31 P500 X0 Y0 Z1.25", *(f"G30 P{k} X{x:.9f} Y{y:.9f} Z-99999 H0" for k, (x, y) in enumerate(PLACES))]
-    told = " ".join(f"{one:.9f}" for one in heights)
-    return "\n".join([*lines, f"G32 bed probe heights: {told}, mean 0.010, deviation from mean 0.2"])
+    heights_text = " ".join(f"{one:.9f}" for one in heights)
+    return "\n".join([*lines, f"G32 bed probe heights: {heights_text}, mean 0.010, deviation from mean 0.2"])
 
 
 def test_wrong_endstops_are_found_from_the_heights_that_they_give(tmp_path):

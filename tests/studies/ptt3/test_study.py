@@ -254,16 +254,21 @@ def test_a_spread_in_mm_cannot_learn_positions_and_one_of_scaled_inputs_can(taug
 
 def test_backwards_only_a_compensated_backlash_keeps_its_benefit(taught):
     """Play is another error on the way back: uncompensated, what was learned on the way there is wrong by the width."""
-    tasks, kept = {"radius_mm": [400.0], "height_mm": [10.0], "payload_kg": [0.0]}, {}
+    tasks, benefits = {"radius_mm": [400.0], "height_mm": [10.0], "payload_kg": [0.0]}, {}
     for name in ("plain", "light"):
         one, what = taught[name]
         frame = driving.extrapolations(one, what, tasks)
         # a circle of 480 mm is out of reach, and the own payload is no change
         assert set(frame["family"]) == {"none", "height_mm", "reverse"}
-        kept[name] = frame.set_index(["family", "method", "axis"])["benefit_percent"]
-    assert kept["plain"]["reverse", "rbf_inverse", "x"] < 75.0 < 95.0 < kept["light"]["reverse", "rbf_inverse", "x"]
+        benefits[name] = frame.set_index(["family", "method", "axis"])["benefit_percent"]
+    assert (
+        benefits["plain"]["reverse", "rbf_inverse", "x"]
+        < 75.0
+        < 95.0
+        < benefits["light"]["reverse", "rbf_inverse", "x"]
+    )
     # parameters hold 10 mm above the curve, narrow Gaussians have nothing to say there
-    away = kept["light"]["height_mm"]
+    away = benefits["light"]["height_mm"]
     assert away["parameters", "y"] > 90.0 > away["rbf_paper_mm", "y"]
 
 

@@ -46,16 +46,16 @@ def log(count, seed=1, noise_mm=0.01):
     tracker = _placement(Rotation.from_rotvec([0.02, -0.015, 1.9]), (1800.0, -2300.0, 450.0))
     tool = _placement(Rotation.from_euler("xyz", [0.3, -0.4, 1.0]), (35.0, -20.0, 140.0))
     while len(poses) < count:
-        told = np.radians([generator.uniform(*limits) for limits in RANGES_DEG])
-        bent = told + offsets
+        commanded = np.radians([generator.uniform(*limits) for limits in RANGES_DEG])
+        bent = commanded + offsets
         for _ in range(3):
-            bent = told + offsets + COMPLIANCE * _torques(_frames(bent, lengths))
+            bent = commanded + offsets + COMPLIANCE * _torques(_frames(bent, lengths))
         last = _frames(bent, lengths)[-1]
         if last[2, 3] < 50.0:
             continue
         end = tracker @ last @ tool
         place = end[:3, 3] + generator.normal(0.0, noise_mm, 3)
-        poses.append([*np.degrees(told), *place, *Rotation.from_matrix(end[:3, :3]).as_euler("ZYX", degrees=True)])
+        poses.append([*np.degrees(commanded), *place, *Rotation.from_matrix(end[:3, :3]).as_euler("ZYX", degrees=True)])
     return pd.DataFrame(poses, columns=[*JOINTS, *"XYZABC"])
 
 

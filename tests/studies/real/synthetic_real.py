@@ -20,11 +20,11 @@ def real_tables():
     return {name: check(name, frame) for name, frame in frames.items()}
 
 
-def _empty(table, **told):
-    """A row of a table with values for what is not told: 1 for numbers, nothing for texts."""
+def _empty(table, **stated):
+    """A row of a table with defaults: 1 for numbers, empty for texts."""
     columns = next(one for one in TABLES if one.name == table).columns
     values = {"str": "", "float64": 1.0, "int64": 1, "bool": True}
-    return {column.name: values[column.kind] for column in columns} | told
+    return {column.name: values[column.kind] for column in columns} | stated
 
 
 def _verdict(name):

@@ -48,7 +48,7 @@ def test_compliance_and_lost_zero_of_a_strange_arm_are_named(studied):
 def test_models_get_better_and_carry(studied):
     steps = arm_tables.tables(studied)["real_steps"].set_index("model")["held_out_rms_mm"]
     assert steps["a"] > 5.0 * steps["b"] > 5.0 * steps["c"]
-    numbers = json.loads(json.dumps(carry.told(studied)))
+    numbers = json.loads(json.dumps(carry.saved_values(studied)))
     one = carry.model(studied.series, numbers, studied.measurements, ROBOTS, _settings())
     other = carry.carried([one, one])
     assert (other["causes_rms_mm"] < 0.03).all()
@@ -71,15 +71,15 @@ def test_a_short_series_is_calibrated_but_not_diagnosed(tmp_path):
     figures.spectrum(tables, {"set": "mine"})
 
 
-def test_a_reading_held_out_that_is_far_off_is_told(tmp_path):
+def test_a_far_off_held_out_reading_is_named(tmp_path):
     raw = simulated_arm.log(60)
     raw.loc[40, [*"XYZ"]] += 5.0
     known = arms.prepared(_series(tmp_path, raw), ROBOTS, tmp_path / "sheet.parquet")
     row = arm_tables.tables(arms.studied(known, _settings()))["real_verdicts"].iloc[0]
-    told = "row 41 of tcp"
+    reading = "row 41 of tcp"
     assert (
-        f"far off among those held out: {told}; without: 0.0" in row["notes"]
-        or f"left out of fits: {told}" in row["notes"]
+        f"far off among those held out: {reading}; without: 0.0" in row["notes"]
+        or f"left out of fits: {reading}" in row["notes"]
     )
 
 
@@ -89,9 +89,9 @@ def test_without_held_out_rows_there_is_a_diagnosis(tmp_path):
     assert row["held_out_rms_mm"].isna().all() and row["effects"].iloc[0] == "drive_compliance"
 
 
-def _refused(folder, told, raw=None, robots=ROBOTS, error=ConfigError, **changes):
+def _refused(folder, message, raw=None, robots=ROBOTS, error=ConfigError, **changes):
     series = _series(folder, simulated_arm.log(30) if raw is None else raw, **changes)
-    with pytest.raises(error, match=told):
+    with pytest.raises(error, match=message):
         arms.study(series, robots, _settings(), folder / "sheet.parquet")
 
 
@@ -105,7 +105,7 @@ def test_joints_have_to_be_the_robots(tmp_path):
 def test_orientations_have_to_fit_the_positions(tmp_path):
     reading = simulated_arm.section()["readings"]["tcp"]
     for change in ({"sequence": "XYZ"}, {"rotation_unit": "rad"}):
-        _refused(tmp_path, "log_x.csv: orientations are off by", readings={"tcp": reading | change})
+        _refused(tmp_path, "log_x.csv: orientations have errors of", readings={"tcp": reading | change})
 
 
 def test_wrong_units_and_rows_that_come_twice_are_refused_by_the_files_names(tmp_path):
@@ -120,8 +120,8 @@ def test_wrong_units_and_rows_that_come_twice_are_refused_by_the_files_names(tmp
 def test_chains_have_to_be_there_and_of_their_form(tmp_path):
     section = {"chain": "chain.json", "robot": None}
     series = _series(tmp_path, simulated_arm.log(10), **section)
-    for text, told in ((None, "No such file"), ("{", "JSON"), ("{}", "KeyError 'masses'"), ("[]", "TypeError")):
+    for text, message in ((None, "No such file"), ("{", "JSON"), ("{}", "KeyError 'masses'"), ("[]", "TypeError")):
         if text is not None:
             (tmp_path / "arm" / "chain.json").write_text(text)
-        with pytest.raises(ConfigError, match=rf"real\.sets\.mine\.chain: .*chain\.json.*{told}"):
+        with pytest.raises(ConfigError, match=rf"real\.sets\.mine\.chain: .*chain\.json.*{message}"):
             arms.nominal_robot(series, ROBOTS)

@@ -86,9 +86,9 @@ def test_tables_hold_together():
 
 def test_metres_and_a_held_out_column():
     frame, section, _ = simulated.belts(9, missing_mm=50.0)
-    kept = {"held_out": np.arange(len(frame)) % 4 == 0}
-    small = belts.study((frame / 1000.0).assign(**kept), section | {"unit": "m"}, "simulated")
-    large = belts.study(frame.assign(**kept), section, "simulated")
+    flags = {"held_out": np.arange(len(frame)) % 4 == 0}
+    small = belts.study((frame / 1000.0).assign(**flags), section | {"unit": "m"}, "simulated")
+    large = belts.study(frame.assign(**flags), section, "simulated")
     np.testing.assert_allclose(_value(small, "missing_length"), _value(large, "missing_length"), rtol=1e-5)
     assert small["real_points"]["row"].nunique() == len(frame)
 
@@ -167,13 +167,13 @@ def test_measured_machine(run, truth, rms_mm, anchors):
     frame = simulated.measured(f"maslow/run_{run}.csv")
     case, _ = belts.length_case(frame, Section(MASLOW, "maslow", belts._NEEDED, belts._OPTIONAL))
     everything = np.ones(case.bare.counted.shape, dtype=bool)
-    for laws, expected in zip(
+    for effect_models, expected in zip(
         ((), case.laws["missing_length"][:1], case.laws["missing_length"][-1:]), rms_mm, strict=True
     ):
-        model = case.model(laws)
+        model = case.model(effect_models)
         fit = fit_lengths(model, case.starts(model), everything)
         assert fit.rms_mm == pytest.approx(expected, abs=0.006)
-        if laws == case.laws["missing_length"][:1]:
+        if effect_models == case.laws["missing_length"][:1]:
             np.testing.assert_allclose(fit.values[:5], anchors, atol=0.06)
             assert fit.standard_errors[-8] == pytest.approx(3.1, abs=0.05)
     tables = belts.study(frame, MASLOW, "maslow")
@@ -183,8 +183,8 @@ def test_measured_machine(run, truth, rms_mm, anchors):
     error = _value(tables, "missing_length", "standard_error")
     assert abs(_value(tables, "missing_length") - truth) < 2.0 * error
     # neighbouring rows err alike: rows left out one area after another tell what that is worth
-    law = [*case.laws["missing_length"][:1], *case.laws["length_scale"]]
-    assert error == pytest.approx(_jackknife(case.hypothesis(law).fit), rel=0.3)
+    chosen = [*case.laws["missing_length"][:1], *case.laws["length_scale"]]
+    assert error == pytest.approx(_jackknife(case.hypothesis(chosen).fit), rel=0.3)
 
 
 def _jackknife(fit):

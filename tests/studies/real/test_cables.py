@@ -57,7 +57,7 @@ def test_degrees_and_millimetres():
     ("change", "message"),
     [
         ({"distances": [[1, 1, 0, 0]]}, "3 rows, one per drum, of 4 numbers"),
-        ({"distances": [[1, 1, 0, 0], [1, 0, 0, 0], [0, 1, 0, 2]]}, "a cable at least that runs to a3"),
+        ({"distances": [[1, 1, 0, 0], [1, 0, 0, 0], [0, 1, 0, 2]]}, "at least one cable that runs to a3"),
         ({"distances": [[0, 0, 0, 0], [1, 0, 2, 0], [0, 1, 0, 2]]}, "the cable of drum1"),
         ({"distances": [[1, 1, 0, "x"], [1, 0, 2, 0], [0, 1, 0, 2]]}, "distances: got 'x'"),
         ({"drums": {"drum1": {"column": "drum1_rad"}}}, "a mapping of column and radius_mm"),
@@ -78,9 +78,9 @@ def test_drums_that_take_up_more_than_the_way_are_refused():
     frame, _ = simulated.cables(5)
     for drum in ("drum1_rad", "drum2_rad", "drum3_rad"):
         turned = frame.assign(**{drum: np.degrees(frame[drum])})
-        with pytest.raises(ConfigError, match=rf"mine\.angle_unit: got 'rad, {drum} takes up .* times"):
+        with pytest.raises(ConfigError, match=rf"mine\.angle_unit: got 'rad, {drum} winds .* times"):
             cables.study(turned, SECTION, "mine")
-    with pytest.raises(ConfigError, match="unit of the angles, of the places, radius"):
+    with pytest.raises(ConfigError, match="check angle_unit, unit, radius_mm"):
         cables.study(frame, SECTION | {"unit": "mm"}, "mine")
 
 
@@ -102,8 +102,8 @@ def test_measured_robot():
     section = SECTION | {"row": "pose"}
     case, _, _ = cables.cable_case(frame, Section(section, "kamal", cables._NEEDED, cables._OPTIONAL))
     expected = {(): (2.06, 1.76, 2.36), case.laws["drum_radius"][-1:]: (1.15, 1.49, 1.53)}
-    for laws, rms_mm in expected.items():
-        model = case.model(laws)
+    for effect_models, rms_mm in expected.items():
+        model = case.model(effect_models)
         fit = fit_lengths(model, case.starts(model), np.ones((16, 3), dtype=bool))
         np.testing.assert_allclose(np.sqrt((fit.residual_mm**2).mean(axis=0)), rms_mm, atol=0.006)
     tables = cables.study(frame, section, "kamal")
@@ -111,5 +111,5 @@ def test_measured_robot():
         assert _value(tables, f"{drum}_radius") == pytest.approx(radius, abs=0.006)
         assert _value(tables, f"{drum}_radius", "standard_error") == pytest.approx(error, abs=0.006)
     verdict = tables["real_verdicts"].iloc[0]
-    assert "16 poses do not settle which radius is off" in verdict["notes"]
+    assert "16 poses do not determine which radius has an error" in verdict["notes"]
     assert verdict["effects"].startswith("drum_radius") and verdict["where"] == ""

@@ -113,7 +113,7 @@ def test_no_model_is_worse_than_the_reference(torso, parameter_set, effects, ref
 
 @needs_data
 def test_all_that_positions_tell_is_fitted(torso):
-    """76 numbers at the nominal robot: 12 of frames and markers, and what joints have beside them."""
+    """76 numbers at the nominal robot: 12 of frames and markers, and those of the joints."""
     assert len(torso.robot("frame").parameters) == 12
     fit, _ = torso.model("full")
     assert len(fit.estimate.values) == fit.estimate.rank == 76
@@ -155,7 +155,7 @@ def test_a_passive_joint_described_as_a_drive_shows_its_rods_as_cross_compliance
 
 
 @needs_data
-def test_the_diagnosis_names_compliance_and_foretells_the_held_out_rows(torso):
+def test_the_diagnosis_names_compliance_and_predicts_the_held_out_rows(torso):
     robot = torso.robot("full")
     found = diagnose(torso.of(0), MeasuredRobot(robot, _NO_LOADS, None, "torso"), _SETTINGS)
     sure = found.tables["gap_attribute"].set_index("effect")["probability"]
@@ -218,5 +218,5 @@ def test_a_sheet_has_a_row_for_each_hand_and_the_value_of_what_follows():
 
 
 def test_words_that_are_no_value_of_a_joint_are_refused():
-    with pytest.raises(ConfigError, match=r"a joint's value is 'q_torso0 \* 2'; allowed: a drive, or"):
+    with pytest.raises(ConfigError, match=r"torso_q has 'q_torso0 \* 2'; allowed: a drive, or"):
         robot_section(_CHAIN | {"torso_q": ["q_torso0", "q_torso1", "q_torso0 * 2"]})

@@ -1,7 +1,7 @@
 """An ABB IRB 120 before a laser tracker (icelinker/Robot-Calibration-LaserTracker): 600 poses, six reflectors.
 
 The data lie in the folder that RRRU_REAL_DATA names. Expected numbers: plain least squares of the same models with the
-same rows held out, in the README beside the data. Lengths in mm, angles in rad.
+same rows held out, in the README of the data. Lengths in mm, angles in rad.
 """
 
 import os
@@ -48,15 +48,15 @@ def _found(folder, joints, names=_TOOL):
     """What ingest makes of the joints that were sent ("cmd") or read ("read"), with the rows of the test held out."""
     raw, parts = pd.read_csv(_DATA), []
     for number, name in enumerate(names):
-        told = {f"q{k}_rad": raw[f"{joints}_q{k}_deg"] for k in range(1, 7)}
-        told |= {f"measured_{axis}_mm": raw[f"{name}_{axis}_mm"] for axis in "xyz"}
+        columns = {f"q{k}_rad": raw[f"{joints}_q{k}_deg"] for k in range(1, 7)}
+        columns |= {f"measured_{axis}_mm": raw[f"{name}_{axis}_mm"] for axis in "xyz"}
         order = {"order": 6 * raw["row"] + number, "held_out": raw["held_out"] == 1}
-        parts.append(pd.DataFrame({"trajectory": "poses", "target": name, **told, **order}))
+        parts.append(pd.DataFrame({"trajectory": "poses", "target": name, **columns, **order}))
     table = pd.concat(parts).dropna().sort_values("order")
     path = folder / f"{joints}.csv"
     table.drop(columns=["order", "held_out"]).to_csv(path, index=False)
-    beside = tuple(name for name in names if name in _TABLE)
-    result = ingest(IngestSpec(str(path), angle_unit="deg", frame="register", world_targets=beside), _robot())
+    fixed = tuple(name for name in names if name in _TABLE)
+    result = ingest(IngestSpec(str(path), angle_unit="deg", frame="register", world_targets=fixed), _robot())
     return result, rows.hold_out(result.measurements, table["held_out"]), table["held_out"].to_numpy()
 
 
@@ -76,18 +76,18 @@ def test_calibrations_predict_as_the_reference_does(campaign):
     expected = {"cmd": 0.290, "read": 0.569}[joints]
     residuals = select(table, _robot().reading(rows.reads(table, (), True)), ["*"])
     fit, robot, out = calibrate(residuals), residuals.mechanism, table[held]
-    told = rows.actuators(out, robot), rows.measured(out), rows.command(out)
-    left = TargetPositions(robot, *told, rows.readings(out)).residual(fit.deviations)
+    inputs = rows.actuators(out, robot), rows.measured(out), rows.command(out)
+    left = TargetPositions(robot, *inputs, rows.readings(out)).residual(fit.deviations)
     assert fit.identifiability.rank == len(robot.parameters) == 18 + 15
     assert _rms(left) <= 1.02 * expected and not list(zero_notes(fit.estimate, robot))
 
 
-def _diagnosed(table, laws):
-    """The diagnosis by some laws, of the numbers that the rows tell that are fitted."""
+def _diagnosed(table, effects):
+    """The diagnosis with some effects, of the parameters identifiable from the fitted rows."""
     used = table[rows.usable(table)]
     robot = _robot().reading(rows.reads(table, (), True))
     robot = robot.seen_at(rows.actuators(used, robot), rows.command(used), rows.readings(used))
-    return diagnose(table, MeasuredRobot(robot, Masses(0.0, 0.0, 0.0)), GapSettings(laws, draws=50))
+    return diagnose(table, MeasuredRobot(robot, Masses(0.0, 0.0, 0.0)), GapSettings(effects, draws=50))
 
 
 def test_what_remains_is_named(campaign):

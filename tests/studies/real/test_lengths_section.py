@@ -41,4 +41,4 @@ def test_belts_have_columns_of_their_own_and_are_longer_than_high(key, change):
 def test_a_set_without_files_has_a_page_that_says_so():
     tables = {name: pd.DataFrame(columns=["campaign"]) for name in ("real_points", "real_parameters")}
     (text,) = figures_lengths.lengths(tables, {"set": "mine"}).texts
-    assert text.get_text() == "mine: no file of this set is here, or none that can be used"
+    assert text.get_text() == "mine: no usable file of this set was found"

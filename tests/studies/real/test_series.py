@@ -28,9 +28,9 @@ def test_series_are_called_by_set_file_and_variant(tmp_path):
     (tmp_path / "arm").mkdir()
     for name in ("log_b.csv", "log_a.csv", "other.csv"):
         (tmp_path / "arm" / name).write_text("J1\n1\n")
-    real = _real(tmp_path, variants={"told": {}, "read": {"joints": {"q1_rad": "r1"}}})
+    real = _real(tmp_path, variants={"stated": {}, "read": {"joints": {"q1_rad": "r1"}}})
     found = series.found(real, "mine")
-    assert [one.name for one in found] == ["mine_a_told", "mine_a_read", "mine_b_told", "mine_b_read"]
+    assert [one.name for one in found] == ["mine_a_stated", "mine_a_read", "mine_b_stated", "mine_b_read"]
     assert found[1].section["joints"] == {"q1_rad": "r1"} and found[0].file.name == "log_a.csv"
 
 
@@ -54,7 +54,7 @@ def test_a_folder_that_is_none_has_no_files_and_says_so(tmp_path, monkeypatch, f
 
 
 @pytest.mark.parametrize(
-    ("text", "told"),
+    ("text", "message"),
     [
         ("", "No columns"),
         ("\n\n", "No columns"),
@@ -63,10 +63,10 @@ def test_a_folder_that_is_none_has_no_files_and_says_so(tmp_path, monkeypatch, f
         ("J1,X\n1,2\n1,2,3,4\n", "line 3"),
     ],
 )
-def test_files_that_cannot_be_read_are_named(tmp_path, text, told):
+def test_files_that_cannot_be_read_are_named(tmp_path, text, message):
     with pytest.raises(ConfigError, match=r"real\.sets\.mine: .*log_x\.csv") as error:
         _written(tmp_path, text).read()
-    assert told in str(error.value)
+    assert message in str(error.value)
 
 
 def test_folders_and_other_files_are_no_tables(tmp_path):
@@ -88,30 +88,30 @@ def test_a_set_is_taken_out_by_null(tmp_path):
     real["sets"]["other"] = None
     assert list(series.used(real)) == ["mine"]
     series.check({"real": real, "robots": ROBOTS})
-    with pytest.raises(ConfigError, match=r"real\.sets: got none"):
+    with pytest.raises(ConfigError, match=r"real\.sets: got only null"):
         series.check({"real": {"sets": {"other": None}}, "robots": ROBOTS})
 
 
 @pytest.mark.parametrize(
-    ("changes", "told"),
+    ("changes", "message"),
     [
         ({"files": "/tmp/x*.csv"}, "files: got '/tmp/x"),
         ({"files": "../x*.csv"}, "below the folder"),
         ({"files": "a*/x.csv"}, "one \\* in the file's name"),
         ({"files": "a/x*_*.csv"}, "one \\* in the file's name"),
         ({"files": "a/x[1].csv"}, "one \\* in the file's name"),
-        ({"robot": "nobody"}, "robot: got 'nobody'; allowed: .*: arm"),
+        ({"robot": "unknown"}, "robot: got 'unknown'; allowed: .*: arm"),
         ({"robot": "rrru3"}, "robot: got 'rrru3'; allowed: .*: arm"),
         ({"chain": "chain.json"}, "got both robot and chain"),
-        ({"world_targets": ["table"]}, "world_targets: got 'table'; allowed: of readings: tcp"),
+        ({"world_targets": ["table"]}, "world_targets: got 'table'; allowed: keys of readings: tcp"),
         ({"world_targets": ["tcp"]}, "world_targets: got all of readings"),
         ({"joints": {"q1_rad": "J1", "q2_rad": "J1"}}, "joints: got 'J1' twice"),
         ({"readings": {"tcp": {"position": ["X", "Y", "Y"]}}}, "readings.tcp: got 'Y' twice"),
         ({"variants": {"read": {"joints": {"q1_rad": "J1", "q2_rad": "J1"}}}}, "variants.read.joints: got 'J1' twice"),
     ],
 )
-def test_sections_that_do_not_fit_are_refused(tmp_path, changes, told):
-    with pytest.raises(ConfigError, match=rf"real\.sets\.mine.*{told}"):
+def test_sections_that_do_not_fit_are_refused(tmp_path, changes, message):
+    with pytest.raises(ConfigError, match=rf"real\.sets\.mine.*{message}"):
         series.check({"real": _real(tmp_path, **changes), "robots": ROBOTS})
 
 

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from rrru.errors import ConfigError, IngestError
 from rrru.studies.real.series import Series
-from rrru.studies.real.sheets import in_file, retold, sheet, stated_noise
+from rrru.studies.real.sheets import in_file, in_series_terms, sheet, stated_noise
 from tests.studies.real import simulated_arm
 
 RAW = simulated_arm.log(6)
@@ -20,8 +20,8 @@ def _series(**changes):
     return Series("mine_x", "mine", "x", "", Path("log_x.csv"), simulated_arm.section(**changes))
 
 
-def _refused(raw, told, **changes):
-    with pytest.raises(ConfigError, match=told):
+def _refused(raw, message, **changes):
+    with pytest.raises(ConfigError, match=message):
         sheet(_series(**changes), raw)
 
 
@@ -58,7 +58,7 @@ def test_flags_are_zero_or_one_and_leave_rows_to_fit():
     _refused(RAW.assign(held_out=[0, 1, 2, 0, 0, 0]), "row 3, column held_out: 2; allowed: 0 or 1")
     _refused(RAW.assign(held_out=[0, 1, None, 0, 0, 0]), "row 3, column held_out: nan; allowed: 0 or 1")
     _refused(RAW.assign(held_out="no"), "row 1, column held_out: 'no'; allowed: a number")
-    _refused(RAW, "mine.held_out: no column 'kept'", held_out="kept")
+    _refused(RAW, "mine.held_out: no column 'flag'", held_out="flag")
 
 
 @pytest.mark.parametrize(("column", "value"), [("X", "abc"), ("J2", "1,5"), ("A", "inf"), ("X", np.inf)])
@@ -92,19 +92,19 @@ def test_noise_is_that_of_the_usual_reading():
             stated_noise(_series(readings={"tcp": reading}), RAW.assign(s=stated))
 
 
-def test_a_temperature_is_handed_on_and_blanks_of_it_are_told_by_its_name():
+def test_a_temperature_is_passed_on_and_its_blanks_are_named():
     found = sheet(_series(temperature="T"), RAW.assign(T=21.5))
     assert (found["temperature_c"] == 21.5).all()
     _refused(RAW, r"mine\.temperature: no column 'T'", temperature="T")
 
 
-def test_what_ingest_refuses_is_told_in_the_words_of_the_file():
+def test_ingest_errors_use_the_terms_of_the_file():
     raw = RAW.astype(float)
     raw.loc[1, "A"] = np.nan
     series = _series(readings=TWO)
     whole = sheet(series, raw)
     said = {"file": "sheet.parquet", "row": 5, "column": "measured_x_mm", "value": "as in row 2", "allowed": "once"}
-    (problem,) = retold(IngestError([said]), series, whole).problems
+    (problem,) = in_series_terms(IngestError([said]), series, whole).problems
     assert problem == {"file": "log_x.csv", "row": 3, "column": "A", "value": "as in row 1 of two", "allowed": "once"}
     assert in_file("run 1 point 3: far", whole) == "row 2 of one: far"
     assert in_file("run 1 point 99: far", pd.DataFrame()) == "run 1 point 99: far"

@@ -33,12 +33,12 @@ def test_plain_models_leave_no_more_than_others_fits_of_them(tables):
         assert row[f"held_out_{model}_rms_mm"] <= 1.02 * row[f"reference_{model}_rms_mm"]
 
 
-def test_drives_that_err_by_their_angle_are_named_and_foretell_what_no_fit_has_seen(tables):
+def test_errors_that_depend_on_the_drive_angle_are_named_and_predict_held_out_rows(tables):
     row = tables["real_verdicts"].iloc[0]
     assert row["effects"].startswith("drive_error_function") and row["probability"] > 0.9
     assert row["held_out_rms_mm"] <= 0.13
     assert row["predicted_share"] == pytest.approx(row["held_out_share"], abs=0.05)
-    assert "a rough function of every drive's angle" in row["notes"] and "the function by" in row["notes"]
+    assert "a rough function of every drive's angle" in row["notes"] and "for the function" in row["notes"]
 
 
 def test_no_wave_is_left_of_what_stood_out_before(tables):

@@ -1,4 +1,4 @@
-"""Readings of the algorithm beside Tables 3 and 4: curves made up to reproduce them or not."""
+"""Interpretations of the algorithm compared with Tables 3 and 4: synthetic curves that reproduce them or not."""
 
 import numpy as np
 import pandas as pd

@@ -48,7 +48,7 @@ def test_the_fast_path_gives_the_spatial_closures_numbers(task, line_calibration
 
 
 def test_many_draws_at_once_are_each_draws_own(task):
-    # each to first order from the draws' mean: with a small wobble that is what a draw has alone
+    # each to first order from the draws' mean: with a small non-repeatability this equals a draw alone
     steady = twin.Twin(CANDIDATE.values | {"wobble_mm": 0.05})
     together, orders = twin_search.simulate(task, steady)
     for k in range(3):

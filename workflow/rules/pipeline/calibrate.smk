@@ -2,7 +2,7 @@
 GENETIC_SETTINGS = [f"genetic.{key}" for key in config["genetic"] if key != "seeds"]
 CALIBRATION_TABLES = ["calibrations", "parameters", "gauge", "correlations", "observability"]
 GENETIC_TABLES = ["genetic", "genetic_history", "genetic_parameters", "genetic_against_least_squares"]
-# tables of the whole study that are the campaigns' parts, one below the other
+# tables of the whole study: the concatenated parts of the campaigns
 CAMPAIGN_TABLES = [
     "campaigns",
     "registration",

@@ -11,16 +11,16 @@ RESULTS = config["results_dir"].rstrip("/")
 CAMPAIGNS = sorted(config["campaigns"])
 # sections of all that is diagnosed, by name; a study adds its own campaigns
 DIAGNOSED = {name: config["campaigns"][name] for name in CAMPAIGNS}
-# what `snakemake` makes; every study adds its own
+# default targets; every study adds its own
 TARGETS = []
 # figures {name: ("module:function", tables)} by study; every study adds its own
 FIGURES = {}
-# functions that refuse a configuration; every study adds its own
+# functions that check a configuration; every study adds its own
 CHECKS = ["rrru.studies.config:check"]
-# what a study has of a paper's numbers, by the paper's letter: its package with `published` and `audit`, the tables
-# that hold its own numbers, and what it reads of the configuration
+# studies of papers by the paper's letter: package with `published` and `audit`, tables with the study's numbers, and
+# its part of the configuration
 PAPERS = {}
-# tables of studies that are no part of the default run: a page shows what lies there of them, and makes none of it
+# tables of studies outside the default run: a page shows those that exist, and makes none
 OPTIONAL = ["withheld_summary", "withheld_advice_summary", "real_verdicts", "real_steps", "real_budget"]
 
 
@@ -34,7 +34,7 @@ def part(name, campaign="{campaign}"):
 
 
 def verdict(campaign="{campaign}"):
-    """Path of one campaign's answer for scripts."""
+    """Path of one campaign's answer as JSON."""
     return f"{RESULTS}/campaigns/{campaign}/verdict.json"
 
 
@@ -71,7 +71,7 @@ def code(script, *figures):
 
 
 def reads(*keys):
-    """The part of the configuration under dotted keys: all that a rule's script is given of it."""
+    """The part of the configuration under dotted keys: the settings of a rule's script."""
     return parts.part(config, *keys)
 
 
@@ -81,13 +81,13 @@ def campaign_file(wildcards):
 
 
 def campaign_advice(wildcards, name):
-    """A table of the diagnosis whose advice a virtual campaign follows, nothing where it follows none."""
+    """A table of the diagnosis whose advice a virtual campaign follows, or nothing."""
     followed = config["campaigns"][wildcards.campaign].get("advised_by")
     return part(name, followed) if followed else []
 
 
 def campaign_settings(wildcards):
-    """What one campaign is made from."""
+    """Settings of the job of one campaign."""
     name, calibration = wildcards.campaign, config["calibration"]
     return {
         "campaign": name,
@@ -100,23 +100,23 @@ def campaign_settings(wildcards):
 
 
 def calibrated(*keys, driven=False):
-    """What a job about one campaign's calibrations reads, its robots (the real one: to be driven, or its
+    """Settings of a job about one campaign's calibrations: its robots (the real one: to be driven, or its
     deviations) and the configuration under dotted keys.
     """
 
     def settings(wildcards):
         name = wildcards.campaign
         real = {"virtual": parts.virtual(config, name)} if driven else {"truth": parts.truth(config, name)}
-        told = {"campaign": name, "nominal": parts.nominal(config, name), **real, **reads(*keys)}
-        if "calibration" in told:
-            told["calibration"]["sets"] = parts.sets(config, name)
-        return told
+        result = {"campaign": name, "nominal": parts.nominal(config, name), **real, **reads(*keys)}
+        if "calibration" in result:
+            result["calibration"]["sets"] = parts.sets(config, name)
+        return result
 
     return settings
 
 
 def diagnosed(wildcards):
-    """What a diagnosis is told: what is known of the robot, never the truth of a virtual one."""
+    """Settings of a diagnosis: what is known of the robot, never the truth of a virtual one."""
     section = DIAGNOSED[wildcards.campaign]
     return {
         "campaign": wildcards.campaign,
@@ -134,7 +134,7 @@ def diagnosed(wildcards):
 
 
 def own_effects_digests():
-    """Digests of these files, so that editing one reruns what it changes."""
+    """Digests of these files, so that editing one reruns the affected jobs."""
     return [hashlib.sha256(file.read_bytes()).hexdigest() for file in own_effects() if file.is_file()]
 
 
@@ -144,14 +144,14 @@ def own_effects():
 
 
 def campaign_options(campaign):
-    """What the figures that every campaign gets are told."""
+    """Options of the figures of every campaign."""
     of_study = parts.of_reproduced_study(config, campaign)
     method = config["reproduce"]["method"] if of_study else "least_squares"
     return {"campaign": campaign, "method": method, "mode": "closed_loop"}
 
 
 def paper_options():
-    """What the figures of paper A are told."""
+    """Options of the figures of paper A."""
     reproduce = config["reproduce"]
     return {
         **campaign_options(REPRODUCED),
@@ -170,13 +170,13 @@ def template_digests():
 
 
 def optional_digests(_):
-    """Digests of the optional studies' tables that are there."""
+    """Digests of the existing tables of optional studies."""
     files = [Path(table(name)) for name in OPTIONAL]
     return {file.stem: hashlib.sha256(file.read_bytes()).hexdigest() for file in files if file.is_file()}
 
 
 def campaign_page(wildcards):
-    """All that the page of one campaign shows."""
+    """Input files of the page of one campaign."""
     name = wildcards.campaign
     if name not in DIAGNOSED:
         raise ConfigError(f"there is no campaign {name!r}; allowed: {', '.join(DIAGNOSED)}")
@@ -188,6 +188,6 @@ def campaign_page(wildcards):
 
 
 def diagnosed_as(kind):
-    """Pattern of the campaigns whose robot's file is written back as this kind, "" for those without one."""
+    """Pattern of the campaigns whose corrected robot file has this ending, "" for those without one."""
     names = (name for name, section in DIAGNOSED.items() if parts.corrected_kind(config, section) == kind)
     return "|".join(names) or "(?!)"

@@ -21,8 +21,8 @@ GAP_FIGURES = {
 }
 
 
-# one job per campaign, its figures included: starting another would take longer than drawing them. It sees the
-# measurements and what the configuration says of the robot
+# one job per campaign with its figures, because starting another job takes longer than drawing them. It reads the
+# measurements and the robot's part of the configuration
 rule diagnose:
     input:
         measurements=part("measurements"),
@@ -42,7 +42,7 @@ rule diagnose:
         "../../scripts/diagnose.py"
 
 
-# a robot that came as a file goes back as one, with what was found
+# the corrected file of a robot that was given as a file
 use rule diagnose as diagnose_mjcf with:
     output:
         **named([*GAP_TABLES, "gap_points", "corrected_drives"], part),

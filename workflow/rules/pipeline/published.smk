@@ -1,7 +1,7 @@
 PAPER_MODULES = [f"{paper['study']}.{name}" for paper in PAPERS.values() for name in ("published", "audit")]
 
 
-# the numbers of all papers beside the studies' own, and what the papers print wrong
+# the numbers of all papers compared with the studies', and the papers' misprints
 rule published:
     input:
         **named(sorted({name for paper in PAPERS.values() for name in paper["tables"]})),

@@ -15,7 +15,7 @@ rule report:
         "../../scripts/report.py"
 
 
-# one campaign on a page, which takes its own jobs only
+# the page of one campaign, which needs its own jobs only
 use rule report as campaign_report with:
     input:
         campaign_page,

@@ -1,4 +1,4 @@
-# what a corrected file is worth on a campaign that nobody has seen; without its section there is nothing to make
+# errors of a corrected file on a held-out campaign; without its section there is no target
 CHECKS.append("rrru.studies.end_to_end.models:check")
 CIRCLE = config.get("circle", {})
 CIRCLE_TABLES = ["circle", "circle_points"]

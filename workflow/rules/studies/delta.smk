@@ -26,7 +26,7 @@ PAPERS["C"] = {
         *(f"target.{key}" for key in ("columns", "rows", "diameter_mm", "pitch_mm")),
     ),
 }
-# the robot and where it is sent; what it photographs, and with what
+# the robot and its commands; targets and camera
 _ROBOT = ["seed", "robots.delta", *(f"delta.{key}" for key in ("errors", "plane", "poses", "tracker_noise_mm"))]
 _SCENE = [*_ROBOT, *(f"delta.{key}" for key in ("camera", "distance_mm", "mount", "target", "tilted_views"))]
 
@@ -44,7 +44,7 @@ rule delta_images:
         "../../scripts/delta_images.py"
 
 
-# it sees the images and the commands, never the truth
+# it reads the images and the commands, never the truth
 rule delta_vision:
     input:
         images=f"{RESULTS}/delta/images.npz",

@@ -6,7 +6,7 @@ METHOD_FIGURES = {"methods": ("rrru.studies.methods.figures:methods", METHOD_TAB
 FIGURES["method"] = METHOD_FIGURES
 
 
-# the Delta is also given what its images have shown
+# the Delta also has the estimates from its images
 rule compare_methods:
     input:
         calibrations=lambda wildcards: table("delta_calibrations") if wildcards.robot == "delta" else [],

@@ -16,7 +16,7 @@ PTT_STUDY_TABLES = [
     "ptt_corrections",
     "ptt_extrapolation",
 ]
-# what every experiment is made of
+# settings of every experiment
 _MEASURED = ["seed", "robots.ptt3", "loads"]
 _MEASURED += [f"ptt.{key}" for key in ("curve", "motion", "repeats", "noise_mm", "parameters", "robot", "experiments")]
 _PTT = "rrru.studies.ptt3.figures"
@@ -32,7 +32,7 @@ PTT_FIGURES = {
     "ptt_extrapolation": (f"{_PTT}.learning:ptt_extrapolation", ["ptt_extrapolation"]),
 }
 FIGURES["ptt"] = PTT_FIGURES
-# they are diagnosed as every campaign is
+# they are diagnosed like every campaign
 DIAGNOSED |= {name: ptt_parts.campaign_section(config, name) for name in (*PTT_EXPERIMENTS, *PTT_JOINT)}
 PAPERS["B"] = {
     "study": "rrru.studies.ptt3",
@@ -60,7 +60,7 @@ rule ptt_measure:
         "../../scripts/ptt_measure.py"
 
 
-# one job: starting five takes longer than what they do
+# one job, because starting five takes longer than the work
 rule ptt_compensate:
     input:
         **{name: part("measurements", name) for name in PTT_EXPERIMENTS},

@@ -5,7 +5,7 @@ CHECKS.append("rrru.studies.real.series:check")
 REAL_TABLES = [one.name for one in REAL_SCHEMAS]
 REAL_PATHS = {one.name: f"{RESULTS}/{one.path}" for one in REAL_SCHEMAS}
 REAL_SETS = real_series.used(config["real"])
-# machines of which only lengths are known have figures of their own
+# machines with measured lengths have separate figures
 REAL_LENGTHS = [name for name, section in REAL_SETS.items() if "kind" in section]
 REAL_ARMS = [name for name in REAL_SETS if name not in REAL_LENGTHS]
 ARM_FIGURES = {

@@ -31,7 +31,7 @@ PAPERS["A"] = {
         ),
     },
 }
-# figures that every campaign gets, the reproduced one in figures/ itself
+# figures of every campaign, those of the reproduced one in figures/ itself
 CAMPAIGN_FIGURES = {
     "workspace": ("rrru.figures.workspace:workspace", ["workspace", "singularity", "measurements", "campaigns"]),
     "observability": ("rrru.figures.observability:observability", ["observability"]),
@@ -40,7 +40,7 @@ CAMPAIGN_FIGURES = {
 }
 
 
-# all values and seeds of one swept setting in one reading of the paper
+# all values and seeds of one swept setting in one interpretation of the paper
 rule sweep:
     input:
         measurements=part("measurements", REPRODUCED),
@@ -80,7 +80,7 @@ rule sweep_tables:
         "../../scripts/sweep_tables.py"
 
 
-# the reproduced robot under other draws of wobble and noise
+# the reproduced robot for other draws of non-repeatability and noise
 rule redraws:
     output:
         **named(REDRAW_TABLES),

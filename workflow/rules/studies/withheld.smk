@@ -8,7 +8,7 @@ WITHHELD_TABLES = [f"withheld_{name}" for name in WITHHELD_NAMES]
 WITHHELD_ADVICE = ["withheld_advice", "withheld_advice_summary"]
 # the chunks that have robots whose cause is hidden
 WITHHELD_HIDDEN = [name for name, members in WITHHELD.items() if any(member.check == "label" for member in members)]
-# what pages say of own robots, and gross mistakes in files
+# statements of pages of own robots, and gross mistakes in files
 STATEMENTS = statement_chunks(config["withheld"]["sentences"])
 WITHHELD_FIGURES = {
     "withheld": (
@@ -26,9 +26,9 @@ PLANTS_FIGURES = {
 FIGURES["withheld"] = WITHHELD_FIGURES
 if config["withheld"]["mujoco"] + config["withheld"]["own"]:
     FIGURES["withheld"] = WITHHELD_FIGURES | PLANTS_FIGURES
-# and those among them on which other ways to find a cause are tried
+# the robots among them for the comparison of methods
 RIVALLED = rivalled(config["withheld"])
-# what is known of every robot
+# known settings of every robot
 WITHHELD_ROBOT = {
     "robot": parts.robot(config, {"robot": "rrru3"}),
     "masses": parts.masses(config, {}),
@@ -36,8 +36,8 @@ WITHHELD_ROBOT = {
 }
 
 
-# and of those of a chunk, with the robots of files by the file's entry; and with what a diagnosis is told of these
-WITHHELD_KNOWN, WITHHELD_TOLD = (
+# the same for the robots of a chunk, with those of files by the file's entry; and with the input of their diagnosis
+WITHHELD_KNOWN, WITHHELD_MEASURED = (
     {chunk: {"files": described(config, members, as_measured), **WITHHELD_ROBOT} for chunk, members in WITHHELD.items()}
     for as_measured in (False, True)
 )
@@ -63,7 +63,7 @@ rule withheld_robots:
         "../../scripts/withheld_robots.py"
 
 
-# it sees the measurements and which effects its library lacks, never an answer
+# it reads the measurements and the effects removed from its library, never the truth
 rule withheld_diagnose:
     input:
         **named(["withheld_measurements"], under("withheld/{chunk}")),
@@ -77,7 +77,7 @@ rule withheld_diagnose:
     params:
         settings=lambda wildcards: {
             "robots": {one.name: (one.check, one.taken_out, one.file) for one in WITHHELD[wildcards.chunk]},
-            **WITHHELD_TOLD[wildcards.chunk],
+            **WITHHELD_MEASURED[wildcards.chunk],
             **reads("gap"),
         },
         own_effects=own_effects_digests(),
@@ -107,7 +107,7 @@ rule withheld_score:
         "../../scripts/withheld_score.py"
 
 
-# as the diagnosis, it never sees an answer
+# like the diagnosis, it never reads the truth
 rule withheld_beliefs:
     input:
         **named(["withheld_measurements"], under("withheld/{chunk}")),
@@ -157,7 +157,7 @@ rule withheld_summary:
         "../../scripts/withheld_summary.py"
 
 
-# it drives the robots further, so it knows them; the diagnosis that it calls is given measurements alone
+# it drives the robots, so it reads their truth; the diagnosis that it calls has measurements alone
 rule withheld_advice:
     input:
         **{
@@ -176,7 +176,7 @@ rule withheld_advice:
         "../../scripts/withheld_advice.py"
 
 
-# a robot is drawn, and its page made and judged, in one job: the diagnosis is given files alone
+# one job draws a robot and makes and judges its page: the diagnosis has files alone
 rule withheld_statements:
     output:
         **named(["withheld_statements"], under("withheld/{chunk}")),
@@ -208,7 +208,7 @@ rule withheld_sentences:
         "../../scripts/withheld_sentences.py"
 
 
-# a part of the check by itself
+# a separate part of the check
 rule sentences:
     input:
         rules.withheld_sentences.output,

@@ -1,7 +1,8 @@
-"""Chains of turning and sliding joints by plain NumPy, and as URDF and MJCF. Lengths mm, angles rad, masses kg.
+"""Chains of rotary and sliding joints by plain NumPy, and as URDF and MJCF. Lengths mm, angles rad, masses kg.
 
-Written from the textbook formula alone (product of a seat and a motion for every joint; loads as minus the derivative
-of the potential energy by a joint's value), so that nothing of the package's models can hide in it. Files count in m.
+The code follows the textbook formula (product of a seat and a motion for every joint; loads as minus the derivative of
+the potential energy by the joint position). It is independent of the package's models, so that it can check them. Files
+are in m.
 """
 
 from dataclasses import dataclass, replace
@@ -20,7 +21,7 @@ _ARMATURE = {"rad": "5", "mm": "5"}
 class Joint:
     """A joint and the link behind it.
 
-    unit: "rad" where it turns about its axis (3,), "mm" where it slides along it; seat_mm (3,), seat_rad (3,): place
+    unit: "rad" where it rotates about its axis (3,), "mm" where it slides along it; seat_mm (3,), seat_rad (3,): place
     and rotation vector in the link before; span: least and largest value that is driven; mass_kg, centre_mm (3,): of
     the link.
     """
@@ -51,7 +52,7 @@ class Chain:
 
     @property
     def columns(self):
-        """Columns of its drive values in a file."""
+        """Columns of its actuator positions in a file."""
         return tuple(f"{joint.name}_{joint.unit}" for joint in self.joints)
 
     @property
@@ -61,16 +62,16 @@ class Chain:
 
     @property
     def places(self):
-        """Places in its MJCF that may be off as it is built."""
+        """Places in its MJCF that have errors in the robot as built."""
         return [f"{joint.name}_link.{way}" for joint in self.joints for way in ("x", "y", "z", "rx", "ry", "rz")]
 
     def poses(self, values):
-        """Positions (n, 3) and rotations (n, 3, 3) of the platform at drive values (n, K)."""
+        """Positions (n, 3) and rotations (n, 3, 3) of the platform at actuator positions (n, K)."""
         *_, (place, turn) = self._links(values)
         return place + turn @ np.array(self.tip_mm), turn @ Rotation.from_rotvec(self.tip_rad).as_matrix()
 
     def loads(self, values, payload_kg):
-        """Torques in N mm or forces in N (n, K) of all weight on the drives, payloads (n,) hanging at the platform."""
+        """Torques in N mm or forces in N (n, K) on the drives from all weight, with payloads (n,) at the platform."""
         return drive_loads(lambda at: self._energy(at, payload_kg), values, self.units)
 
     def _energy(self, values, payload_kg):
@@ -95,17 +96,17 @@ class Chain:
             yield place, turn
 
     def built(self, generator, length_mm, angle_rad):
-        """The chain as it is built: every seat and the tip off by normal errors of these sizes.
+        """The chain as built: every seat and the tip have normal errors of these sizes.
 
-        Not along what the joint itself or the one before does, which would be a zero of its drive.
+        Errors along the motion of the joint itself or of the one before are left out: they are zero offsets.
         """
         joints, before = [], ()
-        for one in self.joints:
-            shift = length_mm * generator.standard_normal(3) * _across("mm", one, *before)
-            turn = angle_rad * generator.standard_normal(3) * _across("rad", one, *before)
-            seat = tuple((np.array(one.seat_mm) + shift).tolist())
-            joints.append(replace(one, seat_mm=seat, seat_rad=_turned(one.seat_rad, turn)))
-            before = (one,)
+        for joint in self.joints:
+            shift = length_mm * generator.standard_normal(3) * _across("mm", joint, *before)
+            turn = angle_rad * generator.standard_normal(3) * _across("rad", joint, *before)
+            seat = tuple((np.array(joint.seat_mm) + shift).tolist())
+            joints.append(replace(joint, seat_mm=seat, seat_rad=_turned(joint.seat_rad, turn)))
+            before = (joint,)
         tip = np.array(self.tip_mm) + length_mm * generator.standard_normal(3) * _across("mm", *before)
         return replace(self, joints=tuple(joints), tip_mm=tuple(tip.tolist()))
 
@@ -190,29 +191,29 @@ def servo(joint, unit):
 
 
 def quat(vector_rad):
-    """Quaternion of a rotation vector (3,) as MuJoCo writes it."""
+    """Quaternion (w, x, y, z) of a rotation vector (3,) as text."""
     x, y, z, w = Rotation.from_rotvec(vector_rad).as_quat()
     return spaced((w, x, y, z))
 
 
 def _turned(first_rad, then_rad):
-    """Rotation vector of two rotations, the second in the frame that the first has turned."""
+    """Rotation vector of two rotations, the second in the frame rotated by the first."""
     return tuple((Rotation.from_rotvec(first_rad) * Rotation.from_rotvec(then_rad)).as_rotvec().tolist())
 
 
 def _across(unit, *joints):
     """0 or 1 (3,) for every direction: 0 along the axes of those joints that have this unit."""
-    own = [np.abs(joint.axis) for joint in joints if joint.unit == unit]
-    return 1.0 - np.max([np.zeros(3), *own], axis=0)
+    axes = [np.abs(joint.axis) for joint in joints if joint.unit == unit]
+    return 1.0 - np.max([np.zeros(3), *axes], axis=0)
 
 
 def _scale(unit):
-    """What a drive's mm or rad is in a file."""
+    """Factor from mm or rad to the unit of a file."""
     return 1e-3 if unit == "mm" else 1.0
 
 
 def metres(values_mm):
-    """Lengths in m as a file has them."""
+    """Lengths in m as text."""
     return spaced(1e-3 * np.array(values_mm))
 
 
@@ -222,5 +223,5 @@ def _rpy(vector_rad):
 
 
 def spaced(values):
-    """Numbers as a file has them."""
+    """Numbers as text."""
     return " ".join(f"{value:.12g}" for value in values)

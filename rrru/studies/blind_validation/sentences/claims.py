@@ -1,7 +1,7 @@
-"""What a page says: every sentence and number of it as a Claim of a kind. Lengths mm, angles rad.
+"""The statements of a page: every sentence and number as a Claim of a kind. Lengths mm, angles rad.
 
-Each kind of sentence has a pattern, numbers come from the facts and tables. A sentence that no pattern knows is
-of the kind UNKNOWN, so that none is passed over.
+Each kind of sentence has a pattern; numbers come from the facts and tables. A sentence that fits no pattern is of the
+kind UNKNOWN, so that none is missed.
 """
 
 import re
@@ -17,7 +17,7 @@ _Y = rf"(?P<other>{_NUMBER})"
 _ENDS = r" \(95 %: [^)]*\)"
 _SIZED = rf"{_X}(?: [^\s(]+)?(?P<ends>{_ENDS})"
 _SHARE = rf"(?P<share>{_NUMBER}) %(?: of that)?(?:{_ENDS})?"
-# what is said of a cause after its share or size
+# text about a cause after its share or size
 _CAUSE = (
     r"(?P<name>[a-z ]+?)(?P<place> (?:in leg \d+|at [^,:]+?))?"
     rf"(?P<sizes>, (?:\d+ numbers|[^,(]+{_ENDS}(?:, [^,(]+{_ENDS})*))?(?:: .*)?\."
@@ -27,7 +27,7 @@ _P = rf"(?P<probability>more than 0\.99|less than 0\.01|{_NUMBER})"
 
 @dataclass(frozen=True)
 class Claim:
-    """kind; text: as the page has it; stated: what it says, by name."""
+    """kind; text: as on the page; stated: its values and names, by name of the group in the pattern."""
 
     kind: str
     text: str
@@ -69,7 +69,7 @@ _SENTENCES = {
     r"(?P<contest>[^;]*); inspection would\. .*",
     "next, nothing would settle it": r"Next: no further run that was tried in computation would settle it\.",
 }
-# kinds of notes of the diagnosis and of what a corrected file cannot hold
+# kinds of notes of the diagnosis and on what a corrected file cannot hold
 _NOTES = {
     "a zero is off": rf"(?P<site>[^:]+): zero, or the part that it moves, is off by {_X} (?P<unit>degrees|mm) "
     rf"\(95 %: (?P<low>{_NUMBER}) to (?P<high>{_NUMBER})\)",
@@ -103,7 +103,7 @@ _NOTES = {
     "the file cannot hold compliance": r"compliance of (?P<names>.*)",
     "the file cannot hold an effect": r"(?P<name>[a-z]+(?:_[a-z]+)*)",
 }
-# kinds of what reading the file noted
+# kinds of notes from reading the file
 _READ = {
     "no commanded positions": r"no commanded positions: computed from .*",
     "no such column": r"no column (?P<column>\w+): .*",
@@ -139,7 +139,7 @@ def claims(page):
 
 
 def _of_text(text, patterns):
-    """Claims of a sentence: its own, and one for every number or name that it holds besides."""
+    """Claims of a sentence: the sentence itself, and one for every further number or name in it."""
     for kind, pattern in patterns.items():
         if found := re.fullmatch(pattern, text, re.DOTALL):
             stated = {name: value for name, value in found.groupdict().items() if value is not None}
@@ -148,14 +148,14 @@ def _of_text(text, patterns):
 
 
 def _inside(text, stated):
-    """Claims of what a sentence holds beside what it says."""
+    """Claims of the numbers and names inside a sentence."""
     result = []
     if "place" in stated and "name" in stated and "," not in stated["place"]:
         result.append(Claim("place of a cause", text, stated))
     if "share" in stated and "name" in stated:
         result.append(Claim("share of a cause", text, stated))
-    for one in re.finditer(rf"(?:^|, )(?P<name>[a-z ]+) {_P}(?=,|$)", stated.get("each", "")):
-        result.append(Claim("probability of a cause", text, one.groupdict()))
+    for match in re.finditer(rf"(?:^|, )(?P<name>[a-z ]+) {_P}(?=,|$)", stated.get("each", "")):
+        result.append(Claim("probability of a cause", text, match.groupdict()))
     if "listed" in stated and "share" in text.split(":")[0]:
         names = (re.sub(r"( less than)? \d+ %$", "", one) for one in stated["listed"].split(", "))
         result += [Claim("a cause by its share", text, {"name": name}) for name in names if not name[0].isdigit()]
@@ -169,14 +169,14 @@ def _inside(text, stated):
 
 
 def _sizes_in(text, facts):
-    """Claims of the numbers of a cause that a sentence holds, as the facts have them: it writes them in other units."""
+    """Claims of the parameter values of a cause in a sentence, taken from the facts because their units differ."""
     result = []
     for effect in facts["effects"]:
         if f" is {effect['name'].replace('_', ' ')}" not in text:
             continue
-        for one in effect["parameters"]:
-            if re.search(rf"\b{re.escape(one['parameter'])} = ", text):
-                stated = {key: one[key] for key in ("parameter", "value", "low_95", "high_95")}
+        for parameter in effect["parameters"]:
+            if re.search(rf"\b{re.escape(parameter['parameter'])} = ", text):
+                stated = {key: parameter[key] for key in ("parameter", "value", "low_95", "high_95")}
                 result.append(Claim("size of a cause", text, stated | {"effect": effect["name"]}))
     return result
 
@@ -207,7 +207,7 @@ def _of_facts(facts):
 
 
 def _listed(facts):
-    """The verdict in a line."""
+    """The verdict in one line."""
     names = [one["name"] for one in facts["effects"]] + ["unexplained"] * facts["unexplained"]
     return f"{'+'.join(names) or 'none'} ({facts['probability']:.3f})"
 
@@ -232,8 +232,8 @@ def _of_tables(tables):
             result.append(Claim("detectable_mm", f"{row['effect']}: {row['detectable_mm']:.4g} mm", stated))
     shrink = tables["gap_shrink"]
     for kind in ("given_model", "corrected_model"):
-        own = shrink[(shrink["kind"] == kind) & (shrink["trajectory"] == "*")]
-        result += [Claim(f"rms of the {kind}", f"{value:.4g} mm", {"value": value}) for value in own["rms_mm"]]
+        overall = shrink[(shrink["kind"] == kind) & (shrink["trajectory"] == "*")]
+        result += [Claim(f"rms of the {kind}", f"{value:.4g} mm", {"value": value}) for value in overall["rms_mm"]]
     if (shrink["kind"] == "corrected_model").any():
         result.append(Claim("the corrected file is as good as the estimate", "corrected file"))
         result.append(Claim("the corrected file is not worse than the given one", "corrected file"))

@@ -1,4 +1,4 @@
-"""Own robots driven with a hidden cause or none, and what a user would hand in: files. mm, rad, s, kg."""
+"""Own robots driven with a hidden cause or none, and the files that a user would provide. mm, rad, s, kg."""
 
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -12,10 +12,10 @@ from rrru.seeds import stream
 from rrru.studies.blind_validation.sentences.causes import MUJOCO, NAMES, Cause, Stops, draw_cause
 from rrru.studies.blind_validation.sentences.kinds import KINDS
 
-# of a robot as it is built against its file, 1 sigma
+# errors of a robot as built relative to its file, 1 sigma
 _LENGTH_MM, _ANGLE_RAD = 0.2, 4e-4
 _ZERO = {"rad": 0.002, "mm": 0.3}
-# of the instrument's frame against the robot's where the file states that they are one
+# errors between the frames of instrument and robot where the file states that they are the same, 1 sigma
 _FRAME_MM, _FRAME_RAD = 0.2, 2e-4
 NOISE_MM, NOISE_RAD = (0.01, 0.05), 2e-5
 # rms displacement of a cause over the noise
@@ -23,23 +23,23 @@ _WEAKEST, _STRONGEST = 2.0, 25.0
 _FEWEST, _FRESH, _AGAIN = 60, 200, 10
 _SETTLED_S = 8.0
 _PAYLOAD_KG = 5.0
-# readings, and share of a robot's file that MuJoCo drives
+# what is measured: tool, targets with stated places, targets with places to find, pose
 READINGS = ("tool", "stated", "found", "pose")
 _TARGETS_MM = {"a": (60.0, 0.0, 40.0), "b": (-50.0, 60.0, 40.0), "c": (-40.0, -70.0, 60.0)}
 _INSIDE = 0.9
-# what a cause's size begins from, so small that its displacement is in proportion, and times that it is set
+# first size of a cause, small enough for a linear displacement, and number of rescalings
 _SMALL, _SIZINGS = 1e-6, 3
 _ATTEMPTS, _ACTING = 30, 0.65
 
 
 @dataclass(frozen=True)
 class Draw:
-    """A robot as its file has it and as it is built, and how it is measured.
+    """A robot as in its file and as built, and how it is measured.
 
-    plant: numpy or mujoco; kind: of the file; zeros (K,): what every drive stands off; cause: None where nothing acts;
+    plant: numpy or mujoco; kind: of the file; zeros (K,): zero offsets of the drives; cause: None where nothing acts;
     stops; reading: one of READINGS; targets: places by name, None for the tool; frame: rotation and translation from
-    the robot's frame to the instrument's; registered: the file does not state that they are one; noise_mm, per axis;
-    driven: poses by whether the cause acts, of a robot that MuJoCo has driven, see `driven`.
+    the robot's frame to the instrument's; registered: the file does not state that both are the same; noise_mm, per
+    axis; driven: poses by whether the cause acts, of a robot simulated by MuJoCo, see `driven`.
     """
 
     name: str
@@ -60,7 +60,7 @@ class Draw:
 
     @property
     def targets(self):
-        """Places (3,) of what is seen on the platform, by name."""
+        """Places (3,) of the measured targets on the platform, by name."""
         return {"": (0.0, 0.0, 0.0)} if self.reading in ("tool", "pose") else _TARGETS_MM
 
     def poses(self, cause=True, stops=None):
@@ -111,7 +111,7 @@ class Draw:
 
     @property
     def in_words(self):
-        """What is true of it: cause, plant, file, reading and frame."""
+        """The truth in words: cause, plant, file, reading and frame."""
         cause = "none"
         if self.cause is not None:
             cause = self.cause.name + (f" at drive {self.cause.leg}" if self.cause.leg else "")
@@ -130,9 +130,9 @@ class Draw:
 
 
 def draw(number, seed, most_stops, mujoco_share):
-    """The Draw of a number: kinds of robots take turns, then plants, causes and readings are drawn.
+    """The Draw of a number: kinds of robots take turns; plants, causes and readings are random.
 
-    Drawn again where the robot as it is built has no pose at a stop, or no such robot has a cause of that size.
+    Repeated where the robot as built has no pose at a stop, or where the cause is larger than in any real robot.
     """
     for attempt in range(_ATTEMPTS):
         generator = stream(seed, "sentences", number, attempt)
@@ -156,10 +156,10 @@ def _still(number, seed, plant, most_stops, generator):
     built = nominal.built(generator, _LENGTH_MM, _ANGLE_RAD)
     zeros = np.array([_ZERO[unit] for unit in nominal.units]) * generator.standard_normal(len(nominal.units))
     registered = bool(generator.random() < 0.5)
-    # MuJoCo takes its time from stop to stop
+    # MuJoCo needs long from stop to stop
     count = _FEWEST if plant == "mujoco" else int(np.exp(generator.uniform(*np.log([_FEWEST, most_stops]))))
     reading = str(generator.choice(READINGS))
-    # orientations that are never turned do not tell a frame from a tool
+    # with a constant orientation, frame and tool are confounded
     reading = "tool" if reading in ("pose", "found") and not _turns(nominal) else reading
     return Draw(
         name=f"{kind}_{number:04d}",
@@ -185,13 +185,13 @@ def _fits(name, robot):
 
 
 def _turns(robot):
-    """Whether a robot turns its platform."""
+    """Whether a robot rotates its platform."""
     _, turn = robot.poses(robot.spans.T)
     return bool(np.abs(turn[0] - turn[1]).max() > 1e-3)
 
 
 def _sized(draw, cause, strength):
-    """The Draw with a cause whose rms displacement is so many times the noise's."""
+    """The Draw with a cause whose rms displacement is `strength` times that of the noise."""
     plain = replace(draw, plant="numpy", cause=cause.scaled(_SMALL))
     still = plain.poses(cause=False)[0]
     for _ in range(_SIZINGS):
@@ -204,7 +204,7 @@ def _sized(draw, cause, strength):
 def _frame(generator, registered):
     """Rotation and translation from the robot's frame to the instrument's."""
     if registered:
-        # four normal numbers are a quaternion of any turn alike
+        # four normal numbers give a uniformly distributed rotation
         turn = Rotation.from_quat(generator.standard_normal(4)).as_matrix()
         return turn, generator.uniform(-3000.0, 3000.0, 3)
     turn = Rotation.from_rotvec(_FRAME_RAD * generator.standard_normal(3)).as_matrix()
@@ -212,12 +212,12 @@ def _frame(generator, registered):
 
 
 def _stops(robot, count, plant, generator):
-    """So many stops, some of them measured again, and the fresh ones behind them."""
+    """`count` stops, some of them measured again, followed by the fresh ones."""
     fresh = 20 if plant == "mujoco" else _FRESH
     low, high = robot.spans.T
     middle, half = 0.5 * (low + high), 0.5 * _INSIDE * (high - low) * (0.5 if plant == "mujoco" else 1.0)
     drive = middle + half * generator.uniform(-1.0, 1.0, (3 * (count + fresh), len(half)))
-    # where a platform on rods cannot go nobody sends it
+    # poses out of reach are left out
     drive = drive[np.isfinite(robot.poses(drive)[0]).all(axis=1)][: count + fresh]
     if generator.random() < 0.5:
         drive[count - _AGAIN : count] = drive[:_AGAIN]
@@ -225,7 +225,7 @@ def _stops(robot, count, plant, generator):
     if generator.random() < 0.6:
         payload[count // 2 : count] = _PAYLOAD_KG
         payload[count + fresh // 2 :] = _PAYLOAD_KG
-        # so that the stops that are measured again are so under the same load
+        # so that repeated stops have the same payload
         payload[count - _AGAIN : count] = 0.0
     is_fresh = np.arange(len(drive)) >= count
     time = _SETTLED_S * np.arange(len(drive))

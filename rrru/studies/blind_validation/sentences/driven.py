@@ -16,7 +16,7 @@ _LENGTH_MM, _ANGLE_RAD = 0.2, 4e-4
 
 @dataclass(frozen=True)
 class DriveList:
-    """What `rrru.simulation.mujoco_run.Machine.drive` reads of a motion: straight in the drives from stop to stop."""
+    """The input of `rrru.simulation.mujoco_run.Machine.drive`: linear in the drives from stop to stop."""
 
     path_drive: np.ndarray
     path_index: np.ndarray
@@ -29,7 +29,7 @@ class DriveList:
 def mujoco_poses(draw, cause):
     """Positions (n, 3) and rotations (n, 3, 3) of the platform of a Draw at its stops under a Cause or none.
 
-    It is built with errors of the seats in its file. Raises SimulationError where it does not come to rest.
+    The model has errors of the seats in its file. Raises SimulationError where it does not come to rest.
     """
     stops = draw.stops
     with TemporaryDirectory() as folder:
@@ -52,9 +52,9 @@ def mujoco_poses(draw, cause):
 
 
 def driven(draw):
-    """The Draw with its poses as MuJoCo drives it, with its cause and without.
+    """The Draw with its poses simulated by MuJoCo, with and without its cause.
 
-    Raises SimulationError or UnreachableError where it cannot.
+    Raises SimulationError or UnreachableError where the simulation fails.
     """
     causes = {draw.cause is not None, False}
     return replace(draw, driven={acts: mujoco_poses(draw, draw.cause if acts else None) for acts in causes})

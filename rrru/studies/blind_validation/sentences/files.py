@@ -1,6 +1,6 @@
 """Robots' files read again by other code than the package's: a URDF by its tags, an MJCF by MuJoCo. mm, rad.
 
-Loops of an MJCF are closed by Newton's method on MuJoCo's own constraint Jacobian, at stated values of the drives.
+Loops of an MJCF are closed by Newton's method on MuJoCo's own constraint Jacobian, at given actuator positions.
 """
 
 from xml.etree import ElementTree
@@ -14,9 +14,9 @@ _STEPS, _CLOSED_M = 40, 1e-10
 
 
 def file_poses(file, draw, values, payload_kg):
-    """Positions (n, 3), rotations (n, 3, 3) of the platform that a file has at drive values (n, K), and its sites.
+    """Positions (n, 3), rotations (n, 3, 3) of the platform of a file at actuator positions (n, K), and its sites.
 
-    Sites: places (3,) on the platform by name. Of an MJCF the drives give way as its servos do where it has no loops.
+    Sites: places (3,) on the platform by name. The drives of an MJCF without loops deflect by their servo stiffness.
     """
     if draw.kind == "urdf":
         return (*_urdf_poses(file, values), {})
@@ -24,7 +24,7 @@ def file_poses(file, draw, values, payload_kg):
 
 
 def has_play(file):
-    """Whether an MJCF has joints that are the play of others."""
+    """Whether an MJCF has joints that model the backlash of others."""
     model = mujoco.MjModel.from_xml_path(str(file))
     driven = set(model.actuator_trnid[:, 0].tolist())
     names = [model.joint(j).name for j in range(model.njnt) if j not in driven]
@@ -33,7 +33,7 @@ def has_play(file):
 
 def _urdf_poses(file, values):
     """Positions and rotations of the link `tool` of a URDF at drive values of q1, q2, .."""
-    joints = {one.find("child").get("link"): one for one in ElementTree.parse(file).getroot().iter("joint")}
+    joints = {joint.find("child").get("link"): joint for joint in ElementTree.parse(file).getroot().iter("joint")}
     way, link = [], "tool"
     while link in joints and link != "base":
         way.insert(0, joints[link])
@@ -47,8 +47,8 @@ def _urdf_poses(file, values):
         if kind == "fixed":
             continue
         axis = _numbers(joint.find("axis"), "xyz", "1 0 0")
-        own = values[:, int(joint.get("name").removeprefix("q")) - 1]
-        along = np.outer(own, axis / np.linalg.norm(axis))
+        value = values[:, int(joint.get("name").removeprefix("q")) - 1]
+        along = np.outer(value, axis / np.linalg.norm(axis))
         if kind == "prismatic":
             place = place + (turn @ along[:, :, None])[:, :, 0]
         else:
@@ -102,7 +102,7 @@ def _servo(model, joint):
 
 
 def _close(model, data, driven):
-    """Close the loops at the drives' values; NaN in qpos where they do not."""
+    """Close the loops at the actuator positions; NaN in qpos where Newton's method does not converge."""
     free = np.setdiff1d(np.arange(model.nv), driven)
     for _ in range(_STEPS):
         mujoco.mj_fwdPosition(model, data)

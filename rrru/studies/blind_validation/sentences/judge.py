@@ -1,8 +1,8 @@
-"""Whether a Claim is true: a function for every kind, from the Truth to True, False, or None where it cannot be stated.
+"""Whether a Claim is true: a function for every kind, from the Truth to True, False, or None where that is undecided.
 
-A size that is said without an interval is true within 25 % of the truth, beside what the noise leaves open (three
-standard errors) and the two digits that are printed. A number that is said with its standard error is true within three
-of these; a stated 95 % interval where it holds the true number. Lengths mm, angles rad.
+A size without an interval is true within 25 % of the true value, plus three standard errors of the noise and the
+rounding to two printed digits. A number with a standard error is true within three standard errors. A 95 % interval is
+true where it contains the true number. Lengths mm, angles rad.
 """
 
 import re
@@ -12,26 +12,26 @@ import numpy as np
 from rrru.estimation.intervals import QUANTILE_95
 from rrru.studies.blind_validation.sentences.claims import UNKNOWN
 
-# of a size without an interval, of its mean square; of shares; standard errors
+# tolerance of the mean square of a size, and of a share; number of standard errors
 _NEAR, _NEAR_SHARE, _ERRORS = 0.55, 0.2, 3.0
-# chi-square of a cause that nobody could see, and of one that anybody could
+# chi-square below which a cause is not detectable, and above which it is always detectable
 _HIDDEN, _SEEN = 10.0, 60.0
-# gap over noise from which on a cause has to be named
+# least gap over noise of a cause that has to be named
 STRONG = 1.5
 _SURE = 0.9
-# what a file's error may be of the estimate's, and a stated remainder of the true one
+# largest error of a corrected file relative to that of the estimate; relative tolerance of a stated rms
 _AS_GOOD, _REMAINDER = 1.1, 0.1
-# of a noise, and of angles that are read; how often a stated precision a place may be off
+# relative tolerance of a noise, tolerance of measured angles; largest error of a place over its stated precision
 _NEAR_NOISE, _NEAR_TURN_RAD, _MOST_ERRORS = 0.15, 0.03, 3.0
-# least share of the largest error about a place that is called the worst
+# least error about the stated worst place, over the largest local error
 _WORST = 0.5
-# what errors of the links can make of a zero
+# apparent zero offsets from errors of the links
 _OF_LINKS = {"rad": 1e-3, "mm": 0.5}
-# shares are printed to whole per cents
+# rounding of shares that are printed to whole per cents
 _PRINTED = 0.005
-# a robot that errs by this share of the noise without a cause has errors that no model holds
+# residual over noise, without a cause, from which a robot has errors outside every model
 _OWN = 0.3
-# share of a file's rows that are no outliers
+# least share of a file's rows that are not outliers
 _MOST_LEFT = 0.95
 _NEIGHBOURS = 10
 
@@ -45,7 +45,7 @@ def judge(claim, truth, facts):
 
 
 def _sized(said, true, truth, count):
-    """Whether a size is near the true one, as far as the noise of a count of points allows."""
+    """Whether a size agrees with the true one within the tolerance for a count of points."""
     if not np.isfinite(true):
         return None
     spread = truth.noise_rms_mm**2 * np.sqrt(2.0 / (3.0 * count)) + 2.0 * truth.noise_rms_mm * true / np.sqrt(
@@ -55,7 +55,7 @@ def _sized(said, true, truth, count):
 
 
 def _verdict_right(facts, truth):
-    """Whether the verdict names exactly what acts, None where nothing shows that does."""
+    """Whether the verdict names exactly the acting causes, None where a verdict none is undecided."""
     named = {one["name"] for one in facts["effects"]}
     if not named and not facts["unexplained"]:
         return _none(None, truth, facts)
@@ -63,34 +63,34 @@ def _verdict_right(facts, truth):
 
 
 def _none(_stated, truth, _facts):
-    """Nothing systematic is left that the data could show."""
+    """No systematic error is detectable in the data."""
     if not truth.acts or truth.chi2 < _HIDDEN:
         return True
     return False if truth.chi2 > _SEEN else None
 
 
 def _verdict(_stated, truth, facts):
-    """A cause of 1.5 times the noise or more is named exactly, and what the library lacks is called unexplained."""
+    """A cause of 1.5 times the noise or more is named exactly, or called unexplained outside the library."""
     return _verdict_right(facts, truth) if truth.strength >= STRONG else None
 
 
 def _no_false_name(stated, truth, _facts):
-    """Nothing is named that does not act."""
+    """No cause is named that does not act."""
     return set(stated["names"]) <= set(truth.effects)
 
 
 def _leg(stated, truth, _facts):
-    """The leg or drive that is named is the one at which the cause acts."""
+    """The named leg or drive is the one at which the cause acts."""
     if truth.strength < STRONG or set(stated["names"]) != set(truth.effects) or not truth.effects:
         return None
     if truth.leg:
         return stated["leg"] == truth.leg
-    # of causes at several drives one may make all that shows
+    # of causes at several drives, one may dominate
     return None if stated["leg"] else True
 
 
 def _cause(stated, truth, _facts):
-    """The effect that is named acts."""
+    """The named effect acts."""
     return stated["name"].replace(" ", "_") in truth.effects
 
 
@@ -110,13 +110,13 @@ def _by_its_share(stated, truth, _facts):
 
 
 def _probability_of_cause(stated, truth, _facts):
-    """A cause that is said to be as good as certain acts; a smaller probability claims nothing."""
+    """A cause with a probability of 0.9 or more acts; a smaller probability is undecided."""
     sure = stated["probability"].startswith("more") or float(stated["probability"].split()[-1]) >= _SURE
     return _one_of([stated["name"]], truth) if sure else None
 
 
 def _place(stated, truth, facts):
-    """It acts where the sentence says."""
+    """The cause acts at the stated place."""
     name = stated["name"].replace(" ", "_")
     if name not in truth.effects or not truth.leg:
         return False if name not in truth.effects else None
@@ -125,7 +125,7 @@ def _place(stated, truth, facts):
 
 
 def _share_of_cause(stated, truth, _facts):
-    """The effect makes that share of the gap at points that were left out."""
+    """The effect has the stated share of the held-out gap."""
     if stated["name"].replace(" ", "_") not in truth.effects:
         return False
     return abs(float(stated["share"]) / 100.0 - truth.share) <= _NEAR_SHARE
@@ -143,7 +143,7 @@ def _size_of_cause(stated, truth, _facts):
 
 
 def _error(low, high):
-    """The standard error of a normal distribution with an interval of 95 %."""
+    """The standard error of a normal distribution from its 95 % interval."""
     return (float(high) - float(low)) / (2.0 * QUANTILE_95)
 
 
@@ -153,27 +153,27 @@ def _misfit(_stated, _truth, _facts):
 
 
 def _shares_undetermined(_stated, truth, _facts):
-    """The gap is small beside the noise."""
+    """The gap is smaller than the noise."""
     return truth.before_mm < truth.noise_rms_mm
 
 
 def _unexplained(_stated, truth, _facts):
-    """Something acts that the library does not hold."""
+    """A cause outside the library acts."""
     return truth.outside
 
 
 def _probability(_stated, truth, facts):
-    """A probability of 0.9 or more stands by a right answer; a smaller one claims nothing."""
+    """An answer with a probability of 0.9 or more is correct; a smaller probability is undecided."""
     return _verdict_right(facts, truth) if facts["probability"] >= _SURE else None
 
 
 def _scatter(stated, _truth, _facts):
-    """These robots repeat, so that nothing does not."""
+    """These robots repeat exactly, so that the stated share has to be zero."""
     return stated.get("share") == "0"
 
 
 def _rival(stated, truth, _facts):
-    """What cannot be ruled out acts; that nothing does can be where the gap is plain."""
+    """A cause that cannot be ruled out acts; no cause at all can be ruled out where the gap is clear."""
     if stated["name"].replace(" ", "_") in truth.effects or (stated["name"].startswith("something") and truth.outside):
         return True
     if stated["name"] == "that nothing acts":
@@ -182,23 +182,23 @@ def _rival(stated, truth, _facts):
 
 
 def _next_nothing(_stated, truth, facts):
-    """No more is needed where the answer is right."""
+    """No more measurements are needed where the answer is correct."""
     return _verdict_right(facts, truth)
 
 
 def _zero(stated, truth, _facts):
-    """The zero of a drive, or with it the part that it moves, is off by that."""
+    """The stated zero offset of a drive, alone or together with the part that it moves."""
     if stated["site"] not in truth.zeros:
         return None
     scale = np.degrees(1.0) if stated["unit"] == "degrees" else 1.0
     true = truth.zeros[stated["site"]], truth.geometry.get(f"d{stated['site']}", np.inf)
-    off = min(abs(float(stated["value"]) - scale * one) for one in true)
+    off = min(abs(float(stated["value"]) - scale * zero) for zero in true)
     links = scale * _OF_LINKS[{"degrees": "rad"}.get(stated["unit"], "mm")]
     return off <= _ERRORS * _error(stated["low"], stated["high"]) + links
 
 
 def _zeros_lost(stated, truth, _facts):
-    """The largest zero that reading the file found, before anything was fitted: within half of it."""
+    """The largest zero offset found from the file, before any fit: within half of the true value."""
     if stated["site"] not in truth.zeros:
         return None
     scale = np.degrees(1.0) if stated["unit"] == "degrees" else 1.0
@@ -207,22 +207,22 @@ def _zeros_lost(stated, truth, _facts):
 
 
 def _weight(_stated, _truth, _facts):
-    """These robots stand upright and carry what the file says."""
+    """These robots are upright and carry the stated mass."""
     return False
 
 
 def _points(stated, truth, _facts):
-    """The file has so many rows."""
+    """The file has the stated number of rows."""
     return int(stated["rows"]) in (truth.rows, truth.stops) and int(stated["used"]) <= int(stated["rows"])
 
 
 def _few(stated, truth, _facts):
-    """So many numbers were read: three of a position, six of a pose."""
+    """The stated number of readings: three for a position, six for a pose."""
     return int(stated["numbers"]) <= truth.rows * (6 if truth.turned else 3)
 
 
 def _noise_larger(_stated, truth, _facts):
-    """The noise is as stated: only what no model holds, as of MuJoCo's servos, makes it look larger."""
+    """The noise is as stated; only errors outside every model, as those of MuJoCo's servos, make it look larger."""
     return truth.outside or truth.still_mm > _OWN * truth.noise_rms_mm
 
 
@@ -232,18 +232,18 @@ def _unmeasured_again(_stated, truth, _facts):
 
 
 def _needs(stated, _truth, _facts):
-    """The file has times, payloads and drive values, and neither speeds nor temperatures."""
+    """The file has times, payloads and actuator positions, and neither speeds nor temperatures."""
     return not {"time_s", "payload_kg", "drive_load"} & set(stated["needs"].split(", "))
 
 
 def _needs_different(stated, truth, _facts):
-    """Payloads are all alike; times and drive values differ."""
+    """Payloads are all equal; times and actuator positions differ."""
     needs = set(stated["needs"].split(", "))
     return False if "time_s" in needs else truth.payloads == 1 if "payload_kg" in needs else None
 
 
 def _absorbed(stated, truth, _facts):
-    """The calibration takes up an effect entirely: it is not the one that acts and shows."""
+    """An effect that the calibration absorbs is not the acting and detectable one."""
     return not (stated["name"] in truth.effects and truth.chi2 > _SEEN)
 
 
@@ -253,56 +253,57 @@ def _file_leaves(stated, truth, _facts):
 
 
 def _within(said, true_mm):
-    """Whether an rms is the true one within a tenth."""
+    """Whether an rms agrees with the true one within a tenth."""
     return abs(float(said) / true_mm - 1.0) <= _REMAINDER if np.isfinite(true_mm) else None
 
 
 def _file_worse(stated, truth, _facts):
-    """What the given file misses by."""
+    """The residual rms of the given file within a tenth."""
     return _within(stated["other"], truth.given_read_mm)
 
 
 def _lost(stated, _truth, facts):
-    """What the file cannot hold has been found at all."""
+    """The effect that the file cannot hold is part of the verdict."""
     names = {one["name"] for one in facts["effects"]} | ({"unexplained"} if facts["unexplained"] else set())
     return stated["name"] in names
 
 
 def _lost_kind(name):
-    """Whether a found effect is what the file cannot hold of drives."""
+    """A judge of whether an effect of the drives that the file cannot hold is part of the verdict."""
     return lambda _stated, _truth, facts: name in {one["name"] for one in facts["effects"]}
 
 
 def _noise(stated, truth, _facts):
-    """The measuring noise."""
+    """The measurement noise."""
     return abs(float(stated["value"]) / truth.noise_rms_mm - 1.0) <= _NEAR_NOISE + 1.5 / np.sqrt(truth.rows)
 
 
 def _worst(stated, truth, _facts):
-    """The errors about the place are among the largest, where there is a gap."""
+    """The errors about the stated place are among the largest, where there is a gap."""
     if truth.seen_mm < truth.noise_rms_mm:
         return None
     squares = (truth.error_mm**2).sum(axis=1)
 
-    def about(point):
+    def local_mean_square(point):
         near = np.argsort(np.linalg.norm(truth.position_mm - point, axis=1))[:_NEIGHBOURS]
         return squares[near].mean()
 
-    return about(np.array(stated["at"])) >= _WORST * max(about(point) for point in truth.position_mm)
+    largest = max(local_mean_square(point) for point in truth.position_mm)
+    return local_mean_square(np.array(stated["at"])) >= _WORST * largest
 
 
 def _holds(ends, true, digit=0.0):
-    """Whether an interval holds a number, its ends good to a digit."""
+    """Whether an interval contains a number, with its ends rounded to a digit."""
     return None if true is None or not np.isfinite(true) else ends[0] - digit <= true <= ends[1] + digit
 
 
 def _closed(stated, truth, _facts):
-    """Interval of the share that the verdict's effects close of the gap at fresh stops."""
+    """Interval of the fraction of the gap at fresh stops that the verdict's effects explain."""
     return _holds(stated["ends"], 1.0 - truth.after_mm / truth.before_mm, _PRINTED) if truth.before_mm else None
 
 
 def _budget(stated, truth, _facts):
-    """Interval of a part's share of the gap: what does not act has none."""
+    """Interval of a part's share of the gap; a part that does not act has the share zero."""
     part = stated["part"]
     if stated["kind"] == "effect":
         if part not in truth.effects:
@@ -314,13 +315,13 @@ def _budget(stated, truth, _facts):
 
 
 def _number(stated, truth, _facts):
-    """Interval of a number of the calibration, of a cause or of the weight."""
+    """Interval of a parameter of the calibration, of a cause, or of payload and tilt."""
     if stated["effect"] == "calibration":
         return _holds(stated["ends"], truth.geometry.get(stated["parameter"]))
     if stated["effect"] == "weight":
         return _holds(stated["ends"], 0.0)
     if stated["effect"] not in truth.effects:
-        # that it does not act is counted with its name
+        # that the effect does not act is counted with its name
         return None
     true = truth.numbers[stated["effect"]].get(stated["parameter"])
     if true is not None and stated["parameter"].startswith("phase"):
@@ -341,7 +342,7 @@ def _by_factor(stated, truth, _facts):
 
 
 def _as_good(_stated, truth, facts):
-    """The corrected file misses by no more than a tenth beyond the estimate, or the page states what it misses by."""
+    """The error of the corrected file is at most a tenth above that of the estimate, or the page states it."""
     if not np.isfinite(truth.file_mm):
         return None
     if truth.file_mm <= _AS_GOOD * truth.after_mm:
@@ -351,25 +352,25 @@ def _as_good(_stated, truth, facts):
 
 
 def _not_worse(_stated, truth, _facts):
-    """The corrected file misses by no more than the file as it came."""
+    """The error of the corrected file is at most that of the given file."""
     known = np.isfinite(truth.file_mm) and np.isfinite(truth.given_mm)
     return truth.file_mm <= truth.given_mm if known else None
 
 
 def _drives(_stated, truth, _facts):
-    """The robot stands where corrected_drives sends it, as near as the estimate is."""
+    """The robot reaches the targets of corrected_drives with the error of the estimate."""
     return _sized(truth.drives_mm, truth.after_mm, truth, truth.stops) if np.isfinite(truth.drives_mm) else None
 
 
 def _detectable(stated, truth, facts):
-    """An effect that is so much larger than what can be detected is named."""
+    """An effect of 1.5 times the detectable size or more is named."""
     if stated["effect"] not in truth.effects or truth.strength * truth.noise_rms_mm < STRONG * stated["value"]:
         return None
     return stated["effect"] in {one["name"] for one in facts["effects"]}
 
 
 def _reflector(stated, truth, _facts):
-    """A reflector's place, as far as it is stated, within three times what it may be off by."""
+    """A reflector's place, in the stated coordinates, within three times its stated precision."""
     if stated["name"] not in truth.places:
         return None
     place = np.array(stated["place"].replace("?", "nan").split(", "), dtype=float)
@@ -378,7 +379,7 @@ def _reflector(stated, truth, _facts):
 
 
 def _outliers(_stated, _truth, _facts):
-    """No reading of these files is spoilt."""
+    """These files have no corrupted reading."""
     return False
 
 
@@ -388,22 +389,22 @@ def _missing(stated, _truth, _facts):
 
 
 def _registered(stated, truth, _facts):
-    """So many points were read, but for a few outliers."""
+    """The stated number of points was read, except a few outliers."""
     return _MOST_LEFT * truth.rows <= int(stated["points"]) <= truth.rows
 
 
 def _overlap(_stated, _truth, facts):
-    """The shares of the effects are more than the whole."""
+    """The shares of the effects sum to more than the whole."""
     return sum(one["share"] or 0.0 for one in facts["effects"]) > 1.0
 
 
 def _next_run(stated, truth, _facts):
-    """The run that is advised is one of the campaign's path, or of poses; whether it decides is not tried here."""
+    """The advised run is on the campaign's path, or of poses; whether it decides is not tested here."""
     return stated["run"].startswith(("stops", "poses")) or bool(re.match(r"\d+ poses", stated["run"]))
 
 
 def _next_inspection(stated, truth, _facts):
-    """What acts is one of the causes that no run would decide between; nothing shows where it could not be seen."""
+    """An acting cause is among those that no run would decide between; undecided where it is not detectable."""
     words = re.sub(r"^(?:between|whether) | acts$", "", stated["contest"])
     if _one_of(re.split(r" and | \+ ", words), truth):
         return True
@@ -411,17 +412,17 @@ def _next_inspection(stated, truth, _facts):
 
 
 def _turned(stated, _truth, _facts):
-    """The instrument's orientations are those of the platform, but for the robot's own errors."""
+    """The instrument's orientations are those of the platform, except the robot's own errors."""
     return float(stated["value"]) <= _NEAR_TURN_RAD
 
 
 def _undecided(_stated, _truth, _facts):
-    """Says nothing that the truth could contradict."""
+    """A sentence that the truth can neither confirm nor contradict."""
     return None
 
 
 def _true(_stated, _truth, _facts):
-    """So it is in every file here."""
+    """A sentence that is true of every file here."""
     return True
 
 

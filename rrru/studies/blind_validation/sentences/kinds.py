@@ -10,7 +10,7 @@ _AXES = {"x": _X, "y": _Y, "z": _Z}
 
 
 def _chain(generator, rows, tip_mm, hangs=False):
-    """A Chain of rows (letter of the axis, seat in mm, span, mass), capital letters sliding; all sizes vary."""
+    """A Chain of rows (letter of the axis, capital for a slide; seat in mm; span; mass) with random variations."""
     joints, scale = [], generator.uniform(0.75, 1.3)
     for number, (letter, seat, span, mass) in enumerate(rows, 1):
         unit = "mm" if letter.isupper() else "rad"
@@ -47,12 +47,12 @@ _WRIST = [
 
 
 def _arm4(generator):
-    """Three axes and a wrist that turns about the upright."""
+    """Three axes and a wrist that rotates about the vertical."""
     return _chain(generator, [*_ARM, ("z", (450, 0, 0), (-1.5, 1.5), 1.5)], (70, 0, -60))
 
 
 def _arm5(generator):
-    """An arm without the turn of its forearm."""
+    """An arm without rotation of its forearm."""
     return _chain(generator, [*_ARM, *_WRIST[1:]], (90, 20, 30))
 
 
@@ -62,7 +62,7 @@ def _arm6(generator):
 
 
 def _arm6_offset(generator):
-    """Six axes with offsets in the wrist, as light arms have them."""
+    """Six axes with offsets in the wrist, as in light arms."""
     wrist = [("y", (390, 110, 0), (-1.2, 1.2), 2.2), ("z", (0, 90, -40), (-1.3, 1.3), 1.8)]
     return _chain(generator, [*_ARM, *wrist, ("y", (0, 60, -90), (-1.8, 1.8), 0.5)], (20, 90, 0))
 
@@ -73,7 +73,7 @@ def _arm6_hanging(generator):
 
 
 def _arm7(generator):
-    """Seven axes by turns along and across the arm."""
+    """Seven axes, alternately along and across the arm."""
     rows = [
         ("z", (0, 0, 170), (-1.2, 1.2), 4.0),
         ("y", (0, 0, 170), (-0.9, 0.9), 4.0),
@@ -92,7 +92,7 @@ def _arm6_on_rail(generator):
 
 
 def _scara(generator):
-    """Two upright axes, a quill, and its turn."""
+    """Two vertical axes, and a quill that slides and rotates."""
     rows = [
         ("z", (0, 0, 300), (-1.3, 1.3), 9.0),
         ("z", (330, 0, 60), (0.3, 1.9), 5.0),
@@ -103,7 +103,7 @@ def _scara(generator):
 
 
 def _lift_scara(generator):
-    """A carriage on a column with three upright axes."""
+    """A carriage on a column with three vertical axes."""
     rows = [
         ("Z", (0, 0, 400), (-250, 250), 15.0),
         ("z", (80, 0, 0), (-1.2, 1.2), 6.0),
@@ -128,12 +128,12 @@ def _slides():
 
 
 def _gantry4(generator):
-    """Three slides and a turn about the upright."""
+    """Three slides and a rotation about the vertical."""
     return _chain(generator, [*_slides(), ("z", (0, 0, -150), (-1.8, 1.8), 2.0)], (70, 20, -90))
 
 
 def _gantry5(generator):
-    """Three slides and a head of two axes, as milling machines have it."""
+    """Three slides and a head of two axes, as in milling machines."""
     head = [("z", (0, 0, -150), (-1.6, 1.6), 3.0), ("y", (0, 40, -90), (-1.0, 1.0), 2.0)]
     return _chain(generator, [*_slides(), *head], (40, 0, -140))
 
@@ -150,7 +150,7 @@ def _polar(generator):
 
 
 def _cylindrical(generator):
-    """A column that turns, with a carriage and a ram."""
+    """A rotating column with a carriage and a ram."""
     rows = [
         ("z", (0, 0, 200), (-1.4, 1.4), 14.0),
         ("Z", (60, 0, 300), (-200, 250), 9.0),
@@ -167,7 +167,7 @@ def _circle(radius_mm, degrees, height_mm=0.0):
 
 
 def _pairs(generator, apart):
-    """Angles (6,) in degrees of three pairs, not quite even."""
+    """Angles (6,) in degrees of three pairs, with small random errors."""
     return np.repeat([0.0, 120.0, 240.0], 2) + apart * np.tile([-1.0, 1.0], 3) + generator.uniform(-4.0, 4.0, 6)
 
 
@@ -176,9 +176,11 @@ def _hexapod(generator, spread=(250.0, 170.0), uneven=3.0):
     low, high = generator.uniform(0.8, 1.3, 2)
     foot = _circle(spread[0] * low, _pairs(generator, generator.uniform(12.0, 22.0)), 50.0)
     head = _circle(spread[1] * low, _pairs(generator, generator.uniform(40.0, 48.0)), -20.0)
-    foot, head = (one + uneven * generator.standard_normal((6, 3)) for one in (foot, head))
+    foot, head = (points + uneven * generator.standard_normal((6, 3)) for points in (foot, head))
     home = np.array([0.0, 0.0, 470.0 * high])
-    return Rods("strut", tuple(range(6)), foot, _along(_Z), foot, head, home, _even(60.0 * low), _masses(generator))
+    return Rods(
+        "strut", tuple(range(6)), foot, _along(_Z), foot, head, home, _symmetric(60.0 * low), _masses(generator)
+    )
 
 
 def _along(axis):
@@ -186,9 +188,9 @@ def _along(axis):
     return np.tile(np.array(axis), (6, 1))
 
 
-def _even(most):
+def _symmetric(limit):
     """A span about zero."""
-    return (-float(most), float(most))
+    return (-float(limit), float(limit))
 
 
 def _masses(generator, masses=(4.0, 1.4, 0.6)):
@@ -197,27 +199,37 @@ def _masses(generator, masses=(4.0, 1.4, 0.6)):
 
 
 def _hexapod_uneven(generator):
-    """Six struts between two rings that are far from even."""
+    """Six struts between two strongly irregular rings."""
     return _hexapod(generator, uneven=15.0)
 
 
 def _hexaglide(generator):
-    """Six rods on carriages of upright rails."""
+    """Six rods on carriages of vertical rails."""
     size = generator.uniform(0.8, 1.2)
     foot = _circle(400.0 * size, _pairs(generator, 18.0), 200.0) + generator.uniform(-10.0, 10.0, (6, 3))
     head = _circle(130.0 * size, _pairs(generator, 42.0), 0.0)
     home = np.array([0.0, 0.0, 200.0 + 420.0 * size])
     return Rods(
-        "rail", tuple(range(6)), foot, _along(_Z), foot, head, home, _even(45 * size), _masses(generator, (3, 2, 0.4))
+        "rail",
+        tuple(range(6)),
+        foot,
+        _along(_Z),
+        foot,
+        head,
+        home,
+        _symmetric(45 * size),
+        _masses(generator, (3, 2, 0.4)),
     )
 
 
 def _delta_rails(generator):
-    """A delta on three upright rails."""
+    """A delta on three vertical rails."""
     size, drive = generator.uniform(0.8, 1.3), (0, 0, 1, 1, 2, 2)
     foot, head = _rod_pairs(240.0 * size, 60.0 * size, 45.0 * size)
     home = np.array([0.0, 0.0, -380.0 * size])
-    return Rods("rail", drive, foot, _along(_Z), foot, head, home, _even(90 * size), _masses(generator, (1, 1, 0.2)))
+    return Rods(
+        "rail", drive, foot, _along(_Z), foot, head, home, _symmetric(90 * size), _masses(generator, (1, 1, 0.2))
+    )
 
 
 def _rod_pairs(outer_mm, inner_mm, half_mm):
@@ -246,13 +258,13 @@ def _delta(generator):
         pivot,
         head,
         home,
-        _even(0.35),
+        _symmetric(0.35),
         _masses(generator, (1, 1, 0.2)),
     )
 
 
 def _hexa(generator):
-    """Six rods on cranks of their own."""
+    """Six rods, each on its own crank."""
     size = generator.uniform(0.8, 1.2)
     degrees = _pairs(generator, 20.0)
     pivot, foot = (_circle(radius * size, degrees) for radius in (260.0, 420.0))
@@ -260,7 +272,7 @@ def _hexa(generator):
     side = _circle(1.0, degrees + 90.0)
     home = np.array([0.0, 0.0, -430.0 * size])
     masses = _masses(generator, (3, 1, 0.3))
-    return Rods("crank", tuple(range(6)), foot, side, pivot, head, home, _even(0.2), masses)
+    return Rods("crank", tuple(range(6)), foot, side, pivot, head, home, _symmetric(0.2), masses)
 
 
 KINDS = {

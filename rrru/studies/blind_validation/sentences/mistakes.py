@@ -1,7 +1,7 @@
-"""Gross mistakes put into right files, what would be the right words for each, and whether they show. Lengths mm.
+"""Gross mistakes put into correct files, the correct words for each, and whether they are detectable. Lengths mm.
 
-A mistake shows where the nominal robot at the values that the file states, the instrument registered rigidly where its
-frame is not stated, misses by three times as much as without it: else the file is as good as a right one.
+A mistake is detectable where the residual of the nominal robot is three times as large with the mistake as without. The
+instrument is registered rigidly where its frame is not stated. Otherwise the file is as good as a correct one.
 """
 
 import re
@@ -23,9 +23,9 @@ _MEASURED = ["measured_x_mm", "measured_y_mm", "measured_z_mm"]
 
 @dataclass(frozen=True)
 class Handed:
-    """What a user hands in: rows of a file, the campaign's section, the robot, and patterns that the right words fit.
+    """The input of a user: rows of a file, the campaign's section, the robot, and patterns of the correct words.
 
-    nominal: the robot whose file is handed in; places: of the targets as they are stated.
+    nominal: the robot of the file; places: of the targets as stated.
     """
 
     rows: object
@@ -36,14 +36,14 @@ class Handed:
 
 
 def _right(own, section):
-    """The right file."""
+    """The correct file."""
     exact = own.readings(own.poses())
     rows = own.table(exact, True)[np.repeat(~own.stops.fresh, len(own.targets))]
     return Handed(rows, section, own.nominal, (), own.targets)
 
 
 def _signs(handed, own, names):
-    """The columns of some drives counted the other way."""
+    """The columns of some drives with the opposite sign."""
     rows = handed.rows.assign(**{name: -handed.rows[name] for name in names})
     turned = ", ".join(f"{name}: -1" for name in own.nominal.columns if name in names)
     return replace(handed, rows=rows, words=(re.escape(f"signs: {{{turned}}}"),))
@@ -58,12 +58,12 @@ def _order(handed, own, order):
 
 
 def _one_sign(handed, own, generator):
-    """One drive counts the other way."""
+    """One drive has the opposite sign."""
     return _signs(handed, own, [str(generator.choice(own.nominal.columns))])
 
 
 def _all_signs(handed, own, _generator):
-    """All drives count the other way."""
+    """All drives have the opposite sign."""
     return _signs(handed, own, list(own.nominal.columns))
 
 
@@ -80,13 +80,13 @@ def _exchanged(handed, own, generator):
 
 
 def _reversed(handed, own, _generator):
-    """The drives stand in reverse order."""
+    """The drives are in reverse order."""
     units = own.nominal.units
     return _order(handed, own, list(range(len(units)))[::-1]) if units == units[::-1] else None
 
 
 def _moved_on(handed, own, generator):
-    """The drives are numbered from another one on."""
+    """The drives are numbered from another drive on."""
     count = len(own.nominal.units)
     step = int(generator.integers(1, count))
     order = [*range(step, count), *range(step)]
@@ -94,23 +94,23 @@ def _moved_on(handed, own, generator):
 
 
 def _late(handed, own, _generator, by=1):
-    """Measured columns stand some rows too low."""
+    """Measured columns are shifted down by some rows."""
     if own.reading not in ("tool", "pose"):
         return None
     names = [name for name in handed.rows if name.startswith("measured_")]
     moved = handed.rows[names].shift(by)
-    # values of a row stand so many rows below it
+    # the values of a row are `by` rows below it
     rows = handed.rows.assign(**{name: moved[name] for name in names}).iloc[by:]
     return replace(handed, rows=rows, words=(rf"not {by} rows? late|rows may be shifted",))
 
 
 def _late_by_two(handed, own, generator):
-    """Measured columns stand two rows too low."""
+    """Measured columns are shifted down by two rows."""
     return _late(handed, own, generator, 2)
 
 
 def _tool(handed, own, _generator):
-    """The tool is longer than the file of the robot, or the stated places, say."""
+    """The tool is longer than in the robot's file or in the stated places."""
     if own.reading == "stated":
         places = {name: [x, y, z + _TOOL_MM] for name, (x, y, z) in own.targets.items()}
         words = (r"targets: \{",)
@@ -140,7 +140,7 @@ def _targets_exchanged(handed, own, _generator):
 
 
 def _left_handed(handed, _own, _generator):
-    """The instrument's y counts the other way."""
+    """The instrument's y axis has the opposite sign."""
     rows = handed.rows.assign(measured_y_mm=-handed.rows["measured_y_mm"])
     return replace(handed, rows=rows, words=("right-handed|mirror|left-handed",))
 
@@ -161,13 +161,13 @@ def _in_degrees(handed, own, _generator):
 
 
 def _other_robot(handed, own, generator):
-    """The robot's file is that of another robot of its kind, which lost zeros of the drives may do as well."""
+    """The robot's file is that of another robot of its kind; lost zeros of the drives look alike."""
     other = KINDS[own.robot_kind](generator)
     return replace(handed, nominal=other, words=("does not fit the robot|`robot` is another one|`robot` is right",))
 
 
 def _frame(handed, own, generator):
-    """The instrument stands somewhere, and the section does not say so."""
+    """The instrument has an arbitrary frame, and the section does not say so."""
     turn = Rotation.from_rotvec(generator.uniform(0.5, 1.5, 3)).as_matrix()
     if own.registered or own.reading == "pose":
         return None
@@ -193,7 +193,7 @@ MISTAKES = {
     "other robot": _other_robot,
     "frame": _frame,
 }
-# no mistake, but for the frame, can be seen in what a rigid registration leaves
+# the residual of a rigid registration does not show these mistakes
 _OF_FRAME = ("frame", "metres")
 
 
@@ -211,18 +211,18 @@ def with_mistake(number, seed, most_stops):
 
 
 def right_draw(number, seed, most_stops, label):
-    """A Draw without a cause, of a stream of its own."""
+    """A Draw without a cause, from a separate stream."""
     return replace(draw(number, stream(seed, label).integers(2**31), most_stops, 0.0), cause=None)
 
 
 def right_file(number, seed, most_stops):
-    """The Draw of a right file, and what is Handed in."""
+    """The Draw of a correct file, and what is Handed in."""
     own = right_draw(number, seed, most_stops, "right files")
     return own, _right(own, own.section(".", "stops.csv"))
 
 
 def shows(name, own, handed):
-    """Whether a mistake shows in the file at all."""
+    """Whether a mistake is detectable in the file."""
     if name in _OF_FRAME:
         return True
     right = _right(own, own.section(".", "stops.csv"))
@@ -230,7 +230,7 @@ def shows(name, own, handed):
 
 
 def _rms(handed, own):
-    """Rms in mm of what the nominal robot leaves, registered where the frame is not stated; endless without a pose."""
+    """Residual rms in mm of the nominal robot, registered where the frame is not stated; infinite without a pose."""
     place, turn = handed.nominal.poses(handed.rows[list(own.nominal.columns)].to_numpy())
     names = handed.rows["target"] if "target" in handed.rows else [""] * len(handed.rows)
     if own.reading == "found":
@@ -254,7 +254,7 @@ def _rms_found(rows, place, turn, names):
 
 
 def _left(measured, said, registered):
-    """Rms in mm, after a rigid registration where one is asked for."""
+    """Residual rms in mm, after a rigid registration where `registered`."""
     if not np.isfinite(said).all():
         return np.inf
     rotation, shift = _kabsch(measured, said) if registered else (np.eye(3), np.zeros(3))
@@ -271,7 +271,7 @@ def _kabsch(measured, said):
 
 
 def read(own, handed, folder):
-    """What reading a file gives: accepted, refused or traceback, and the words."""
+    """The result of reading a file: accepted, refused or traceback, and the words."""
     own = replace(own, nominal=handed.nominal)
     own.write(folder, handed.rows, "stops.csv")
     section = handed.section | {"ingest": str(folder / "stops.csv")}
@@ -279,16 +279,16 @@ def read(own, handed, folder):
         found = page.read(section, handed.nominal.section(str(folder / own.robot_file), own.kind))
     except RrruError as error:
         return "refused", str(error)
-    # anything else that ends a run is a defect, whatever it is
+    # any other exception is a defect
     except Exception as error:
         return "traceback", f"{type(error).__name__}: {error}"
     return "accepted", "; ".join(found.notes)
 
 
 def is_mirrored(own, handed, words):
-    """Whether exchanged legs of a robot that is its own mirror image have been taken for a mirrored frame.
+    """Whether exchanged legs of a mirror-symmetric robot have been taken for a mirrored frame.
 
-    Of three like legs both explain the readings alike, and no file tells which it is.
+    With three equal legs both explain the readings equally well, and the file cannot decide.
     """
     legs = len(own.nominal.units) == 3 and own.nominal.formats == ("mjcf",)
     exchanged = any(pattern.startswith("order:") for pattern in handed.words)
@@ -296,5 +296,5 @@ def is_mirrored(own, handed, words):
 
 
 def named(handed, words):
-    """Whether words name the mistake with the key to write."""
+    """Whether words name the mistake and the key to write."""
     return all(re.search(pattern, words, re.DOTALL) for pattern in handed.words)

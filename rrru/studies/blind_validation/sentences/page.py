@@ -1,4 +1,4 @@
-"""What a user's files give: the campaign read, diagnosed, and the robot's file corrected, as the workflow does it."""
+"""The results for a user's files as in the workflow: campaign read and diagnosed, robot file corrected."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -18,8 +18,8 @@ _CORRECTED = {"urdf": "corrected.urdf", "mjcf": "corrected.xml"}
 
 @dataclass(frozen=True)
 class Page:
-    """All that a page is made of: facts of `verdict.json`, tables by name, what reading the file noted, what the
-    corrected file cannot hold, and where that file is.
+    """The content of a page: facts of `verdict.json`, tables by name, notes from reading the file, what the corrected
+    file cannot hold, and the path of that file.
     """
 
     facts: dict
@@ -31,7 +31,7 @@ class Page:
 
 @dataclass(frozen=True)
 class Run:
-    """A Page with what the truth is computed with: the diagnosis, its masses, and the campaign as it was read."""
+    """A Page with the input for the truth: the diagnosis, its masses, and the campaign as it was read."""
 
     page: Page
     diagnosis: Diagnosis
@@ -41,19 +41,19 @@ class Run:
 
 
 def nominal_part(section, robot_section):
-    """The part of the configuration that makes the nominal robot of a campaign's section."""
+    """The part of the configuration for the nominal robot of a campaign's section."""
     return parts.robot({"robots": {"own": robot_section}}, section)
 
 
 def read(section, robot_section):
-    """The campaign of a section as it is read; raises IngestError or ConfigError where it is refused."""
+    """The campaign of a section as read; raises IngestError or ConfigError where it is refused."""
     return ingest(IngestSpec.from_config(section), setup.mechanism(nominal_part(section, robot_section)))
 
 
 def run(name, section, robot_section, settings):
     """The Run of a campaign's section.
 
-    settings: `gap`, a GapSettings; `margin`, of singularities. Raises what the workflow ends with.
+    settings: `gap`, a GapSettings; `margin`, of singularities. Raises the errors with which the workflow ends.
     """
     nominal = nominal_part(section, robot_section)
     ingested, gap = read(section, robot_section), settings["gap"]

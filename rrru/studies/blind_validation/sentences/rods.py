@@ -4,8 +4,8 @@ A rod runs from a ball on its drive to a ball on the platform and keeps its leng
 
     |p + R b_i - a_i(q)| = l_i(q),   i = 1 .. 6
 
-a_i moves on a crank or a rail, or stays where the rod itself is the drive. Newton's method on these six equations gives
-the pose; loads on the drives are minus the derivatives of the potential energy.
+a_i moves on a crank or a rail, or is fixed where the rod itself is the drive. Newton's method on these six equations
+gives the pose. Loads on the drives are minus the derivatives of the potential energy.
 """
 
 from dataclasses import dataclass, replace
@@ -22,12 +22,13 @@ _TINY, _LARGEST_STEP = 1e-12, np.repeat([100.0, 0.3], 3)
 
 @dataclass(frozen=True)
 class Rods:
-    """kind: strut (the rod is the drive), rail or crank; drive (6,): number of each rod's drive; foot_mm (6, 3): where
-    its ball is at drive values of 0, of a strut where it stands; axis (6, 3): of the rail or crank; pivot_mm (6, 3): a
-    point on the crank's axis; head_mm (6, 3): its ball on the platform; home_mm (3,): the platform at drive values of
-    0, not turned; span: least and largest drive value; masses_kg: platform, what the drive moves, rod.
+    """A platform on six rods.
 
-    extra_mm (6,): what each rod is longer than at home.
+    kind: strut (the rod is the drive), rail or crank; drive (6,): number of each rod's drive; foot_mm (6, 3): its ball
+    at actuator positions of 0, of a strut its base; axis (6, 3): of the rail or crank; pivot_mm (6, 3): a point on the
+    crank's axis; head_mm (6, 3): its ball on the platform; home_mm (3,): the platform at actuator positions of 0, not
+    rotated; span: least and largest actuator position; masses_kg: platform, part moved by the drive, rod; extra_mm
+    (6,): length of each rod beyond that at home.
     """
 
     kind: str
@@ -54,7 +55,7 @@ class Rods:
 
     @property
     def columns(self):
-        """Columns of its drive values in a file."""
+        """Columns of its actuator positions in a file."""
         return tuple(f"{name}_{self.unit}" for name in self._names)
 
     @property
@@ -69,14 +70,14 @@ class Rods:
 
     @property
     def places(self):
-        """Places in its MJCF that may be off as it is built: where struts stand, and balls of platforms that turn."""
+        """Places in its MJCF with errors as built: bases of struts, and balls of platforms that rotate."""
         if len(self.units) == 3:
             return [f"{name}_drive.{way}" for name in self._names for way in "xyz"]
         body = "cylinder" if self.kind == "strut" else "drive"
         return [f"{name}_{part}.{way}" for name in self._names for part in (body, "ball") for way in "xyz"]
 
     def poses(self, values):
-        """Positions (n, 3) and rotations (n, 3, 3) of the platform at drive values (n, K), NaN where none is found."""
+        """Positions (n, 3) and rotations (n, 3, 3) of the platform at actuator positions (n, K), NaN without one."""
         values = np.asarray(values, dtype=float)
         foot, length = self._feet(values), self._lengths(values)
         place, turn = np.tile(self.home_mm, (len(values), 1)), np.tile(np.eye(3), (len(values), 1, 1))
@@ -86,7 +87,7 @@ class Rods:
             size = np.linalg.norm(rod, axis=1)
             along = (rod / size[:, None, :]).transpose(0, 2, 1)
             jacobian = np.concatenate([along, np.cross(lever.transpose(0, 2, 1), along)], axis=2)
-            # what has gone astray ends as not closed
+            # a pose that diverges is not closed at the end
             step = np.linalg.solve(jacobian + _TINY * np.eye(6), (length - size)[:, :, None])[:, :, 0]
             step = np.clip(step, -_LARGEST_STEP, _LARGEST_STEP)
             place = place + step[:, :3]
@@ -98,7 +99,7 @@ class Rods:
         return place, turn
 
     def loads(self, values, payload_kg):
-        """Torques in N mm or forces in N (n, K) of all weight on the drives, payloads (n,) hanging at the platform."""
+        """Torques in N mm or forces in N (n, K) on the drives from all weight, with payloads (n,) at the platform."""
         return drive_loads(lambda at: self._energy(at, payload_kg), values, self.units)
 
     def _energy(self, values, payload_kg):
@@ -110,7 +111,7 @@ class Rods:
         height = (platform_kg + payload_kg) * place[:, 2] + rod_kg * middle[:, :, 2].sum(axis=1)
         first = [self.drive.index(k) for k in range(len(self.units))]
         if self.kind == "strut":
-            # the piston, its centre so far behind the ball that it carries
+            # the piston has its centre at a fixed distance behind its ball
             behind = (head - foot) / np.linalg.norm(head - foot, axis=2, keepdims=True)
             height = (platform_kg + payload_kg) * place[:, 2]
             height = height + rod_kg * (head - _PISTON_MM * behind)[:, :, 2].sum(axis=1)
@@ -123,12 +124,14 @@ class Rods:
 
     def _feet(self, values):
         """Balls (n, 6, 3) on the drives."""
-        own = values[:, list(self.drive)]
+        position = values[:, list(self.drive)]
         if self.kind == "strut":
             return np.tile(self.foot_mm, (len(values), 1, 1))
         if self.kind == "rail":
-            return self.foot_mm + own[:, :, None] * self.axis
-        turned = Rotation.from_rotvec((own[:, :, None] * self.axis).reshape(-1, 3)).as_matrix().reshape(-1, 6, 3, 3)
+            return self.foot_mm + position[:, :, None] * self.axis
+        turned = (
+            Rotation.from_rotvec((position[:, :, None] * self.axis).reshape(-1, 3)).as_matrix().reshape(-1, 6, 3, 3)
+        )
         arm = self.foot_mm - self.pivot_mm
         return self.pivot_mm + (turned @ arm[:, :, None])[:, :, :, 0]
 
@@ -138,20 +141,20 @@ class Rods:
         return home + (values[:, list(self.drive)] if self.kind == "strut" else np.zeros((len(values), 6)))
 
     def built(self, generator, length_mm, angle_rad):
-        """The robot as it is built: balls, rods and axes off by normal errors of these sizes.
+        """The robot as built: balls, rods and axes have normal errors of these sizes.
 
-        Not along what the drives themselves do, which would be a zero of theirs.
+        Errors along the motion of the drives are left out: they are zero offsets.
         """
         nominal = np.linalg.norm(self.home_mm + self.head_mm - self.foot_mm, axis=1)
-        foot, head = (one + length_mm * generator.standard_normal((6, 3)) for one in (self.foot_mm, self.head_mm))
+        foot, head = (points + length_mm * generator.standard_normal((6, 3)) for points in (self.foot_mm, self.head_mm))
         if len(self.units) == 3:
-            # rods in pairs stay parallel, as those of a delta are built: else its platform is turned
+            # paired rods of a delta stay parallel, otherwise its platform rotates
             foot, head = (
-                np.repeat(one[::2] - own[::2], 2, axis=0) + own
-                for one, own in ((foot, self.foot_mm), (head, self.head_mm))
+                np.repeat(points[::2] - nominal_points[::2], 2, axis=0) + nominal_points
+                for points, nominal_points in ((foot, self.foot_mm), (head, self.head_mm))
             )
         foot = self.foot_mm + _across(foot - self.foot_mm, self._way())
-        # a strut that is longer is one whose zero is off
+        # an error of a strut's length is a zero offset
         extra = length_mm * generator.standard_normal(6) * (self.kind != "strut")
         extra = np.repeat(extra[::2], 2) if len(self.units) == 3 else extra
         axis = self.axis + angle_rad * generator.standard_normal((6, 3))
@@ -161,7 +164,7 @@ class Rods:
         return replace(self, foot_mm=foot, head_mm=head, axis=axis, extra_mm=nominal - moved + extra)
 
     def _way(self):
-        """Unit vectors (6, 3) along which the drives move the balls at drive values of 0, zero where they do not."""
+        """Unit vectors (6, 3) along which the drives move the balls at actuator positions of 0, zero where fixed."""
         if self.kind == "strut":
             return np.zeros((6, 3))
         way = self.axis if self.kind == "rail" else np.cross(self.axis, self.foot_mm - self.pivot_mm)
@@ -186,20 +189,20 @@ class Rods:
             mine = [rod for rod, drive in enumerate(self.drive) if drive == k]
             bodies += self._leg(name, k, mine, (moved_kg, rod_kg))
             equalities += [
-                f'    <connect name="{self._of(name, mine, rod)}_ball" body1="plate" '
+                f'    <connect name="{self._rod_name(name, mine, rod)}_ball" body1="plate" '
                 f'body2="{self._end(name, mine, rod)}" anchor="{metres(self.head_mm[rod])}"/>'
                 for rod in mine
             ]
         return mjcf(bodies, equalities, [servo(name, self.unit) for name in self._names])
 
     @staticmethod
-    def _of(name, mine, rod):
+    def _rod_name(name, mine, rod):
         """Name of a leg's rod."""
         return name if len(mine) == 1 else f"{name}{'ab'[mine.index(rod)]}"
 
     def _end(self, name, mine, rod):
         """Name of the body that holds the platform."""
-        return f"{name}_piston" if self.kind == "strut" else f"{self._of(name, mine, rod)}_rod"
+        return f"{name}_piston" if self.kind == "strut" else f"{self._rod_name(name, mine, rod)}_rod"
 
     def _leg(self, name, k, mine, masses_kg):
         """Lines of the bodies of a leg."""
@@ -232,7 +235,7 @@ class Rods:
             f'      <inertial pos="{metres(centre)}" mass="{moved_kg:.9g}" diaginertia="{inertia}"/>',
         ]
         for one in mine:
-            length, own = np.linalg.norm(rod[one]), self._of(name, mine, one)
+            length, own = np.linalg.norm(rod[one]), self._rod_name(name, mine, one)
             lines += [
                 f'      <body name="{own}_rod" pos="{metres(self.foot_mm[one] - seat)}" '
                 f'zaxis="{spaced(rod[one] / length)}">',
@@ -244,9 +247,9 @@ class Rods:
 
 
 def _across(shift, way):
-    """Shifts (6, 3) without what lies along unit vectors (6, 3)."""
+    """Shifts (6, 3) without their components along unit vectors (6, 3)."""
     return shift - (shift * way).sum(axis=1, keepdims=True) * way
 
 
-# of a strut: centre of the cylinder from its foot, of the piston from the ball that it carries; length of the piston
+# struts: centre of the cylinder from its foot, of the piston from its ball; length of the piston
 _CYLINDER_MM, _PISTON_MM, _ROD_MM = 120.0, 120.0, 250.0

@@ -1,4 +1,4 @@
-"""Sentences and numbers of pages of own robots, and what becomes of gross mistakes in files, each beside the truth."""
+"""Sentences and numbers of pages of own robots, and answers to gross mistakes in files, compared with the truth."""
 
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -16,11 +16,11 @@ from rrru.studies.blind_validation.sentences.judge import KINDS, judge
 from rrru.studies.blind_validation.sentences.truth import truth_of
 
 _WORDS = {True: "true", False: "false", None: "undecided"}
-# what the numbers of a calibration are worth where the page says itself that something is unexplained
-_BESIDE = ", beside something unexplained"
+# numbers of a calibration count separately where the page itself says that something is unexplained
+_WITH_UNEXPLAINED = ", with something unexplained"
 _OF_NUMBERS = "interval of a number: calibration"
 _LONGEST = 400
-# sentences with which a file is accepted that say that something may be wrong with it
+# sentences that accept a file and warn that it may be wrong
 _WARNINGS = (
     "may be shifted",
     "see that unit, frame and rows belong together",
@@ -38,14 +38,14 @@ def statements(check, numbers, settings):
         with TemporaryDirectory() as folder:
             name, true, said = made(number, settings, Path(folder))
             for count, (kind, text, result) in enumerate(said):
-                # where the files lay is nobody's business, and differs from run to run
+                # the folder of the files differs from run to run
                 shown = " ".join(text.replace(f"{folder}/", "").split())[:_LONGEST]
                 rows.append([check, name, true, count, kind, shown, _WORDS[result]])
     return pd.DataFrame(rows, columns=COLUMNS)
 
 
 def _of_page(number, settings, folder):
-    """Name of a robot, what is true of it in words, and (kind, text, result) of all that its page says."""
+    """Name of a robot, its truth in words, and (kind, text, result) of each claim of its page."""
     own = _driven(number, settings)
     rows = own.table(own.readings(own.poses()), True)
     own.write(folder, rows[np.repeat(~own.stops.fresh, len(own.targets))], "stops.csv")
@@ -65,10 +65,10 @@ def _of_page(number, settings, folder):
 
 
 def _driven(number, settings):
-    """The Draw of a number, by plain NumPy where MuJoCo cannot drive it."""
+    """The Draw of a number, simulated with NumPy where MuJoCo cannot drive it."""
     own = draw(number, settings["seed"], settings["stops"], settings["mujoco_share"])
     if own.plant == "mujoco":
-        # a simulator is not small, and most robots do not need it
+        # a large import that most robots do not need
         from rrru.studies.blind_validation.sentences.driven import driven
 
         try:
@@ -82,12 +82,12 @@ def _judged(claim, truth, facts):
     """Kind, text and result of a Claim."""
     kind = claim.kind if claim.kind in KINDS else UNKNOWN
     if kind == _OF_NUMBERS and facts["unexplained"]:
-        kind += _BESIDE
+        kind += _WITH_UNEXPLAINED
     return kind, claim.text, judge(claim, truth, facts)
 
 
 def _of_mistake(number, settings, folder):
-    """Name of a robot, its mistake, and what becomes of it."""
+    """Name of a robot, its mistake, and (kind, text, result) of the answer to it."""
     name, own, handed = mistakes.with_mistake(number, settings["seed"], settings["stops"])
     if not mistakes.shows(name, own, handed):
         return own.name, name, [(f"mistake named: {name}", "does not show in the file", None)]
@@ -108,7 +108,7 @@ def _of_mistake(number, settings, folder):
 
 
 def _of_right_file(number, settings, folder):
-    """Name of a robot, how it is measured, and whether its right file is accepted."""
+    """Name of a robot, how it is measured, and whether its correct file is accepted."""
     own, handed = mistakes.right_file(number, settings["seed"], settings["stops"])
     became, words = mistakes.read(own, handed, folder)
     return own.name, own.in_words, [("a right file is not suspected", f"{became}: {words}", became == "accepted")]
@@ -117,8 +117,8 @@ def _of_right_file(number, settings, folder):
 def sentences(found):
     """Rows of `sentences`: how many statements of each kind are true, false and undecided, and the first of each."""
     rows = []
-    for kind, own in found.groupby("kind", sort=True):
-        by_result = {result: own[own["result"] == result] for result in ("true", "false", "undecided")}
+    for kind, of_kind in found.groupby("kind", sort=True):
+        by_result = {result: of_kind[of_kind["result"] == result] for result in ("true", "false", "undecided")}
         row = {"kind": kind} | {result: len(part) for result, part in by_result.items()}
         row |= {f"example_{result}": _example(part) for result, part in by_result.items()}
         rows.append(row)
@@ -126,7 +126,7 @@ def sentences(found):
 
 
 def _example(part):
-    """The first statement of a part, and of which robot it is; empty for none."""
+    """The first statement of a part behind the name of its robot; empty for none."""
     return f"{part['robot'].iloc[0]}: {part['text'].iloc[0]}" if len(part) else ""
 
 

@@ -8,9 +8,9 @@ _STEP = {"mm": 1e-2, "rad": 1e-5}
 
 
 def drive_loads(energy, values, units):
-    """Torques in N mm or forces in N (n, K) on the drives at their values (n, K): minus the slopes of the energy.
+    """Torques in N mm or forces in N (n, K) on the drives at their positions (n, K): minus the energy gradient.
 
-    energy: from drive values to potential energies (n,) in N mm; units (K,): "mm" or "rad".
+    energy: from actuator positions to potential energies (n,) in N mm; units (K,): "mm" or "rad".
     """
     result = np.empty_like(values)
     for k, unit in enumerate(units):

@@ -1,7 +1,7 @@
-"""What is true of an own robot whose page has been made: the only code here that knows draw and diagnosis.
+"""The truth about an own robot with a page. No other code here knows both draw and diagnosis.
 
-Sizes are of exact positions: the robot's own, of its plant, against what the calibrated or corrected sim of the
-diagnosis says at the same stops, those of the file and fresh ones that no file has. Lengths mm, angles rad, masses kg.
+Sizes are errors of exact positions: those of the plant compared with the calibrated or corrected model of the diagnosis
+at the same stops. These are the stops of the file and fresh ones that no file has. mm, rad, kg.
 """
 
 from dataclasses import dataclass, field, replace
@@ -18,23 +18,25 @@ from rrru.studies.blind_validation.sentences.causes import Stops
 from rrru.studies.blind_validation.sentences.files import file_poses, has_play
 
 _ALL = "all.csv"
-# a drive arrives from so far, in mm and rad
+# distance from which a drive approaches, in mm and rad
 _APPROACH = {"rad": 0.05, "mm": 20.0}
 
 
 @dataclass(frozen=True)
 class Truth:
-    """effects: names that act and that the library holds; outside: something acts that it lacks; leg: the one drive, or
-    0; strength: what a calibration of exact readings leaves of the cause, over the noise's rms; chi2: the same as a
-    chi-square of the file's readings; numbers: true values by effect and parameter; geometry: values that exact
-    readings without a cause give the calibration's parameters; zeros: of the drives by site; before_mm, after_mm: rms
-    at fresh stops of the calibrated and of the corrected sim, seen_mm: of the calibrated one at the file's rows;
-    still_mm: what a calibration of exact readings leaves without a cause; rows, stops: how many the file has; again:
-    stops were measured twice; payloads: how many different ones; turned: orientations were read; error_mm, position_mm
-    (rows, 3): exact errors of the calibrated sim, and where; payload_kg (rows,); places: of the targets by name;
-    given_mm, file_mm: rms at fresh stops of the robot's file as it came and as corrected, NaN where that is not known,
-    given_read_mm, file_read_mm: at the file's readings; drives_mm: rms of the robot about where `corrected_drives`
-    sends it.
+    """Truth about a robot and its page.
+
+    effects: names of acting effects of the library; outside: a cause outside the library acts; leg: number of the
+    single drive, or 0; strength: residual rms of the cause after a calibration of exact readings, over the noise rms;
+    chi2: the same as a chi-square of the file's readings; numbers: true values by effect and parameter; geometry:
+    values of the calibration's parameters from exact readings without a cause; zeros: of the drives by site; before_mm,
+    after_mm: rms at fresh stops of the calibrated and of the corrected model; seen_mm: of the calibrated one at the
+    file's rows; still_mm: residual rms of a calibration of exact readings without a cause; rows, stops: numbers in
+    the file; again: stops were measured twice; payloads: number of different ones; turned: orientations were measured;
+    error_mm, position_mm (rows, 3): exact errors of the calibrated model and their positions; payload_kg (rows,);
+    places: of the targets by name; given_mm, file_mm: rms at fresh stops of the robot's file as given and as corrected,
+    NaN where that is not known; given_read_mm, file_read_mm: the same at the file's readings; drives_mm: rms distance
+    of the robot from the targets of `corrected_drives`.
     """
 
     effects: frozenset
@@ -68,12 +70,12 @@ class Truth:
 
     @property
     def acts(self):
-        """Whether anything does."""
+        """Whether any cause acts."""
         return bool(self.effects) or self.outside
 
     @property
     def share(self):
-        """The cause's share of the gap at points that were left out: all but what noise does to the calibration."""
+        """The cause's share of the held-out gap: all except the error of the calibration from noise."""
         if not self.acts or not self.before_mm:
             return 0.0
         uncertain = self.noise_rms_mm**2 * len(self.geometry) / (3.0 * self.rows)
@@ -87,7 +89,7 @@ def truth_of(draw, run, folder, gap):
     poses, still = draw.poses(), draw.poses(cause=False) if draw.cause else None
     exact = _as_read(draw, run, draw.readings(poses), folder)
     library = gap.library(case.mechanism)
-    # with the laws as they were fitted: all readings together might have more orders of a drive error function
+    # with the effects as fitted: all readings together could allow more orders of a drive error function
     whole = make_case(exact, case.mechanism, run.masses, run.noise_mm, library, True, case.arm_mm)
     whole = replace(whole, library=whole.library | case.library)
     count = len(exact)
@@ -139,9 +141,9 @@ def _measured_again(stops):
 
 
 def _as_read(draw, run, readings, folder):
-    """Exact readings of all stops as a measurement table in the frame, and with the places, of the file's own."""
+    """Exact readings of all stops as a measurement table, with the frame and the target places of the file's own."""
     table = draw.table(readings, False)
-    # fresh stops lie between the others in time, and behind them in the file
+    # fresh stops are between the others in time, and behind them in the file
     draw.write(folder, table.assign(time_s=np.arange(len(table), dtype=float)), _ALL)
     section = draw.section(folder, _ALL)
     exact = page.read(section, draw.nominal.section(str(folder / draw.robot_file), draw.kind)).measurements
@@ -165,7 +167,7 @@ def turned(vectors_rad):
 
 
 def _seat(draw, own, rotation):
-    """Rotation (3, 3) by which the file's turns have been turned back, as the instrument's target sits on the platform.
+    """Rotation (3, 3) of the instrument's target on the platform, which reading the file has removed.
 
     own: the file's measurement table; rotation (3, 3): of the registration.
     """
@@ -175,7 +177,7 @@ def _seat(draw, own, rotation):
 
 
 def _calibrated(exact, run):
-    """Deviations (p,) of a plain calibration of exact readings, and what it leaves (n, 3) of the positions."""
+    """Deviations (p,) of a plain calibration of exact readings, and its position residuals (n, 3)."""
     case = run.diagnosis.inference.case
     own = make_case(exact.reset_index(drop=True), case.mechanism, run.masses, run.noise_mm, {}, True, case.arm_mm)
     state = calibrate(own)
@@ -183,9 +185,9 @@ def _calibrated(exact, run):
 
 
 def _of_files(draw, run, exact, fresh):
-    """Sizes of the robot's file as it came and as corrected, as fields of a Truth."""
+    """Errors of the robot's file as given and as corrected, as fields of a Truth."""
     result, written = {}, run.page.corrected
-    # where no place of the tool or of a target is stated, a file's tool may stand anywhere
+    # without stated places of tool or targets, the tool of a file is arbitrary
     if draw.reading == "found" or (draw.reading == "pose" and draw.registered):
         return result
     files = {"given": written.with_name(draw.robot_file)}
@@ -195,8 +197,8 @@ def _of_files(draw, run, exact, fresh):
     right = (run.ingested.measurements["status"] == "ok").to_numpy()
     for key, file in files.items():
         loops = draw.kind == "mjcf" and draw.nominal.formats == ("mjcf",)
-        gives = {one["name"] for one in run.page.facts["effects"]} & {"drive_compliance", "backlash"}
-        if key == "file" and draw.kind == "mjcf" and gives and (loops or has_play(file)):
+        joint_effects = {one["name"] for one in run.page.facts["effects"]} & {"drive_compliance", "backlash"}
+        if key == "file" and draw.kind == "mjcf" and joint_effects and (loops or has_play(file)):
             continue
         place, turn, sites = file_poses(file, draw, draw.stops.drive, draw.stops.payload_kg)
         points = [sites.get(name, np.array(at)) if key == "file" else np.array(at) for name, at in draw.targets.items()]
@@ -207,7 +209,7 @@ def _of_files(draw, run, exact, fresh):
 
 
 def _of_drives(draw, run):
-    """Rms of the robot about where `corrected_drives` sends it, NaN where the frame is not the robot's."""
+    """Rms distance of the robot from the targets of `corrected_drives`, NaN where the frame is not the robot's."""
     table = run.page.tables["corrected_drives"]
     drifts = draw.cause is not None and draw.cause.name == "base_drift"
     if drifts or draw.plant == "mujoco" or draw.registered or draw.reading == "found" or not len(table):

@@ -1,4 +1,4 @@
-"""Figures of what paper B's experiments teach: training, slider corrections, benefits on the curve and away from it."""
+"""Figures of learning from paper B's experiments: training, slider corrections, benefits on and off the curve."""
 
 import numpy as np
 
@@ -28,10 +28,10 @@ _FAMILIES = {
     "payload_kg": "payload changed by (kg)",
 }
 _STARTS = {
-    "z": "(d) z, from the first point's, curve begun elsewhere",
-    "z_mean": "(e) the same, z from the mean of all points",
+    "z": "(d) z, relative to the first point, other starts",
+    "z_mean": "(e) the same, z relative to the mean of all points",
 }
-# below it only that a correction harms matters
+# lower limit of the axis; below it only the sign matters
 _LOWEST_PERCENT = -50.0
 
 
@@ -41,15 +41,15 @@ def looks(names):
 
 
 def _axis_title(axis):
-    """An axis, and where the paper counts heights from."""
-    return axis + (", from the first point's" if axis == "z" else "")
+    """An axis, and the reference of the paper's heights."""
+    return axis + (", relative to the first point" if axis == "z" else "")
 
 
 @style.printed
 def ptt_training(tables, options):
     """Error of the network as neurons are added (paper B, Fig. 13, where 20 steps are enough: grey line). (a) The
-    spread with the least cross-validated error, on training points and on points held back; the mark is the chosen
-    number of neurons. (b) The paper's spread, read as of inputs scaled to -1 .. 1 or as mm, for a network that
+    spread with the least cross-validated error, on training points and in cross-validation; the mark is the chosen
+    number of neurons. (b) The paper's spread, for inputs scaled to -1 .. 1 or as mm, for a network that
     learns the correction and one that learns the corrected position.
     """
     spread, every = tables["ptt_spread"], tables["ptt_training"]
@@ -65,7 +65,7 @@ def ptt_training(tables, options):
         best = where(part, neurons=row.neurons)["validation_mse_mm2"]
         left.plot([row.neurons], best, color=colour, marker=mark, linestyle="none", markersize=4.5)
     left.plot([], [], color=style.GREY, label="training points")
-    left.plot([], [], color=style.GREY, linestyle=(0, (1, 1)), label="held back (mark: chosen)")
+    left.plot([], [], color=style.GREY, linestyle=(0, (1, 1)), label="cross-validation (mark: chosen)")
     left.set_title("(a) chosen spread and neurons")
     last = every["experiment"].max()
     for source, (unit, colour) in _SOURCES.items():
@@ -83,7 +83,7 @@ def ptt_training(tables, options):
 
 @style.printed
 def ptt_corrections(tables, options):
-    """What every slider is moved by (paper B, Fig. 15), and by how much the exact inverse (eq. 11) differs from the
+    """Corrections of every slider (paper B, Fig. 15), and the difference between the exact inverse (eq. 11) and the
     Jacobian (eq. 12).
     """
     frame = tables["ptt_corrections"]
@@ -97,7 +97,7 @@ def ptt_corrections(tables, options):
         panels[0, column].set_title(f"({'abc'[column]}) slider {leg}")
         panels[1, column].set_xlabel("point")
     panels[0, 0].set_ylabel("correction (mm)")
-    panels[1, 0].set_ylabel("exact less Jacobian (µm)")
+    panels[1, 0].set_ylabel("exact - Jacobian (µm)")
     style.legend_above(figure, panels[0, :1])
     return figure
 
@@ -106,8 +106,8 @@ def ptt_corrections(tables, options):
 def ptt_benefit(tables, options):
     """(a) to (c) Benefit of every compensation on the test points, the robot driven again (paper B, eq. 21 and Fig.
     17), and the paper's bounds. Lines: 5 % to 95 % over redraws of noise and split, of the methods that are
-    redrawn. (d), (e) Benefit of the network through the Jacobian with the curve begun at other azimuths, one draw
-    each: the paper's height hangs on its first point.
+    redrawn. (d), (e) Benefit of the network through the Jacobian for other start azimuths of the curve, one draw
+    each: the paper's height depends on its first point.
     """
     frame = where(tables["ptt_benefit"], set="test")
     figure = style.new(style.DOUBLE_MM, 148.0)
@@ -142,7 +142,7 @@ def _methods(axes, frame, bound):
 
 
 def _starts(panels, frame):
-    """Benefit in height of the paper's way over the first point's azimuth, by the paper's reference and by the mean."""
+    """Benefit in height of the paper's method over the start azimuth, relative to the first point and to the mean."""
     colours = looks(frame["experiment"].unique())
     for axes, (axis, title) in zip(panels, _STARTS.items(), strict=True):
         for name, rows in experiments(where(frame, axis=axis), "start_deg"):
@@ -156,23 +156,22 @@ def _starts(panels, frame):
 
 @style.printed
 def ptt_extrapolation(tables, options):
-    """Benefit of a correction where it was not learned: every experiment (dotted: the first) with the curve's
-    radius, its height or the payload changed, and every experiment with the curve driven backwards. Below zero the
-    correction harms.
+    """Extrapolation of a correction: benefit in every experiment (dotted: the first) with another radius or height of
+    the curve, another payload, and with the curve driven backwards. A negative benefit means larger errors.
     """
     frame = tables["ptt_extrapolation"]
     shown = {name: METHODS[name] for name in METHODS if name in set(frame["method"])}
     figure = style.new(style.DOUBLE_MM, 150.0)
     panels = figure.subplots(4, 3, sharey=True)
     for column, axis in enumerate("xyz"):
-        own = where(frame, axis=axis)
+        along = where(frame, axis=axis)
         for axes, (family, label) in zip(panels[:, column], _FAMILIES.items(), strict=False):
-            part = own[own["family"].isin([family, "none"])]
+            part = along[along["family"].isin([family, "none"])]
             for method, look in shown.items():
                 _every(axes, where(part, method=method), look)
             axes.set_xlabel(label)
         panels[0, column].set_title(_axis_title(axis), loc="center")
-        _reversed(panels[3, column], where(own, family="reverse"), shown)
+        _reversed(panels[3, column], where(along, family="reverse"), shown)
     for axes in panels.ravel():
         axes.axhline(0.0, color=style.GREY, linewidth=0.5, zorder=0)
     panels[0, 0].set_ylim(_LOWEST_PERCENT, 104.0)
@@ -200,4 +199,4 @@ def _reversed(axes, part, shown):
         place = np.arange(len(names)) + np.linspace(-0.25, 0.25, len(shown))[k]
         axes.plot(place, value, color=colour, marker=mark, linestyle="none", markersize=3.5)
     axes.set_xticks(np.arange(len(names)), [name.removeprefix("ptt_") for name in names])
-    axes.set_xlabel("experiment, curve backwards")
+    axes.set_xlabel("experiment, curve driven backwards")

@@ -1,4 +1,4 @@
-"""Figures of paper B's experiments along the curve: path, errors before and after, what the network leaves."""
+"""Figures of paper B's experiments along the curve: path, errors before and after, residuals of the network."""
 
 import numpy as np
 
@@ -19,8 +19,8 @@ def experiments(frame, by="point"):
 @style.printed
 def ptt_path(tables, options):
     """The curve of every experiment from above, and its height: commanded, measured (paper B, Figs. 10 and 12) and
-    driven again with the network's correction (Fig. 18). Deviations are magnified as stated; heights count from the
-    first point's.
+    driven again with the network's correction (Fig. 18). Deviations are magnified as stated; heights are relative
+    to the first point.
     """
     parts = experiments(tables["ptt_points"])
     figure = style.new(style.DOUBLE_MM, 88.0)
@@ -49,8 +49,8 @@ def ptt_path(tables, options):
 
 @style.printed
 def ptt_errors(tables, options):
-    """Errors along the axes before compensation and when driven again (paper B, Fig. 16); heights count from the
-    first point's.
+    """Errors along the axes before compensation and when driven again (paper B, Fig. 16); heights are relative to
+    the first point.
     """
     parts = experiments(tables["ptt_points"])
     figure = style.new(style.DOUBLE_MM, 100.0)
@@ -72,7 +72,7 @@ def ptt_errors(tables, options):
 
 @style.printed
 def ptt_network(tables, options):
-    """What the chosen network leaves of the corrected positions taught: its answer less theirs (paper B, Fig. 14).
+    """Residuals of the chosen network: its corrected positions minus those learned (paper B, Fig. 14).
     Circles: test points.
     """
     parts = experiments(tables["ptt_points"])
@@ -86,7 +86,7 @@ def ptt_network(tables, options):
             axes.plot(rows["point"], 1e3 * rows[left], color=colour, linewidth=0.7, label=axis)
             axes.plot(test["point"], 1e3 * test[left], color=colour, label=label, **_TEST)
         axes.set_title(name)
-        axes.set_ylabel("left over (µm)")
+        axes.set_ylabel("residual (µm)")
         axes.margins(x=0.01)
     panels[-1].set_xlabel("point")
     style.legend_above(figure, panels[:1], columns=6)

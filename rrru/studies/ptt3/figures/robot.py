@@ -69,10 +69,10 @@ def _map(axes, field, kappa):
 
 @style.printed
 def ptt_backlash(tables, options):
-    """Backlash of the screws (paper B, Figs. 7 and 8, Tables 4 to 6). (a) Encoder's reading less command while a
+    """Backlash of the screws (paper B, Figs. 7 and 8, Tables 4 to 6). (a) Encoder reading minus command while a
     screw is turned forwards, back and forwards again, least load. (b) Backlash by eq. (19) with two standard
-    errors. (c) Scatter of the sliders per unit travel, the curve passed in both directions in turn, beside what the
-    tracker's noise alone gives.
+    errors. (c) Scatter of the sliders per unit travel, the curve passed in both directions in turn, compared with the
+    value from the tracker's noise alone.
     """
     figure = style.new(style.DOUBLE_MM, 70.0)
     left, middle, right = figure.subplots(1, 3, width_ratios=(1.25, 1.0, 1.0))
@@ -85,7 +85,7 @@ def ptt_backlash(tables, options):
         middle.axhline(part["true_mm"].iloc[0], color=colour, linewidth=0.6, zorder=0)
         look = {"color": colour, "marker": _MARKS[leg], "markerfacecolor": "white", "linestyle": "none"}
         middle.errorbar(part["payload_kg"], part["backlash_mm"], 2.0 * part["standard_error_mm"], **look)
-    left.set(xlabel="commanded slider position (mm)", ylabel="encoder less command (mm)")
+    left.set(xlabel="commanded slider position (mm)", ylabel="encoder - command (mm)")
     left.set_title("(a) forwards, back, forwards")
     middle.set(xlabel="payload (kg)", ylabel="backlash (mm)", ylim=(0.0, None))
     middle.set_title("(b) eq. (19); lines: true")
@@ -95,7 +95,7 @@ def ptt_backlash(tables, options):
 
 
 def _repeatability(axes, frame):
-    """Scatter per travel of every slider, and what the tracker's noise alone gives."""
+    """Scatter per travel of every slider, and the value from the tracker's noise alone."""
     for compensated, colour in ((False, "white"), (True, style.SKY)):
         part = where(frame, compensated=compensated).sort_values("leg")
         place = part["leg"] + (0.19 if compensated else -0.19)

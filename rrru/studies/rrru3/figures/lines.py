@@ -59,7 +59,7 @@ def fig10(tables, options):
 
 @style.printed
 def fig12(tables, options):
-    """The lines but the first under the line and the spiral calibration (paper A, Fig. 12). The numbers are the
+    """The lines except the first after the line and the spiral calibration (paper A, Fig. 12). The numbers are the
     smallest and largest error. Grey: points near a constraint singularity. Where a trajectory was passed more than
     once, curves are means over the passes, bands their range.
     """

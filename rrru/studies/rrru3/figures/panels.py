@@ -1,4 +1,4 @@
-"""Errors along a trajectory: what the panels of paper A's figures 9 to 12 share."""
+"""Errors along a trajectory: common parts of the panels of paper A's figures 9 to 12."""
 
 import numpy as np
 from matplotlib.ticker import MaxNLocator
@@ -22,7 +22,7 @@ def before_and_after(tables, options, name):
 
 
 def both_calibrations(tables, options, name):
-    """Curves (label, look, rows of `errors`) under the line calibration and under the spiral's."""
+    """Curves (label, look, rows of `errors`) after the line calibration and after the spiral's."""
     looks = {"calibration_lines": style.LINES, "calibration_spiral": style.SPIRAL}
     return [_curve(tables, options, key, look, name) for key, look in looks.items()]
 
@@ -39,7 +39,7 @@ def draw_along(axes, curve, places, column="error_mm"):
 
 
 def shade_near_singular(axes, places):
-    """Shade the stations near a constraint singularity, where the platform can turn."""
+    """Shade the stations near a constraint singularity, where the platform can rotate."""
     near = np.unique(places.loc[places["status"] == "near_singularity", "station"])
     label = "near a singularity"
     for stretch in np.split(near, np.flatnonzero(np.diff(near) > 1) + 1) if near.size else []:

@@ -1,4 +1,4 @@
-"""Figure 11 of paper A: the spiral before calibration and under both calibrations."""
+"""Figure 11 of paper A: the spiral before calibration and after both calibrations."""
 
 import numpy as np
 from matplotlib.ticker import MaxNLocator
@@ -12,7 +12,7 @@ _COLUMNS = [f"error_{axis}_mm" for axis in _AXES]
 
 @style.printed
 def fig11(tables, options):
-    """The spiral under both calibrations (paper A, Fig. 11). (a) Commanded and attained path, deviations magnified
+    """The spiral after both calibrations (paper A, Fig. 11). (a) Commanded and attained path, deviations magnified
     as stated. (b) to (d) Errors along the axes, with the tolerance of the task. Grey: points near a constraint
     singularity. Where a trajectory was passed more than once, curves are means over the passes, bands their range.
     """
@@ -20,7 +20,7 @@ def fig11(tables, options):
     places = choose.stations(tables["measurements"], name)
     curves = panels.both_calibrations(tables, options, "fig11")
     figure = style.new(style.DOUBLE_MM, 100.0)
-    # a panel in space does not take part in the arrangement: it has its own place at the left
+    # the layout engine does not arrange a 3-D panel: it has a fixed place at the left
     figure.get_layout_engine().set(rect=(0.5, 0.0, 0.5, 1.0))
     path = figure.add_axes((0.0, 0.0, 0.47, 0.9), projection="3d")
     grid = figure.add_gridspec(3, 1)
@@ -38,7 +38,7 @@ def fig11(tables, options):
 
 
 def _path(axes, places, curves):
-    """Commanded path in space and the attained ones with magnified deviations; z points down, as the robot's."""
+    """Commanded path in space and the attained ones with magnified deviations; z points down."""
     ground = places.drop_duplicates("station").set_index("station").sort_index()
     command = ground[[f"{axis}_mm" for axis in _AXES]].to_numpy()
     deviations = [choose.along(errors, places, _COLUMNS)[0].to_numpy() for _, _, errors in curves]
@@ -53,11 +53,11 @@ def _path(axes, places, curves):
     axes.set_box_aspect(np.maximum(high - low, 1.0), zoom=0.83)
     axes.view_init(elev=35.0, azim=-60.0)
     axes.set(xlabel="x (mm)", ylabel="y (mm)", zlabel="z (mm), down")
-    for one in (axes.xaxis, axes.yaxis, axes.zaxis):
-        one.set_major_locator(MaxNLocator(4))
-        one.set_pane_color("white")
-        one.set_tick_params(pad=-1.0)
-        one.labelpad = -1.0
+    for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
+        axis.set_major_locator(MaxNLocator(4))
+        axis.set_pane_color("white")
+        axis.set_tick_params(pad=-1.0)
+        axis.labelpad = -1.0
     axes.zaxis.set_rotate_label(False)
     axes.zaxis.label.set_rotation(90.0)
     axes.zaxis.labelpad = 1.0
@@ -65,7 +65,7 @@ def _path(axes, places, curves):
 
 
 def _component(axes, places, curves, tags, axis):
-    """Error along one axis under each calibration, the ranges as numbers above the panel."""
+    """Error along one axis after each calibration, the ranges as numbers above the panel."""
     ranges = [panels.draw_along(axes, curve, places, f"error_{axis}_mm") for curve in curves]
     texts = [
         f"{tag} {style.number(low)} to {style.number(high)}" for tag, (low, high) in zip(tags, ranges, strict=True)

@@ -1,4 +1,4 @@
-"""Figures 6 and 7 of paper A: the objective against the genetic algorithm's settings, beside the scatter of seeds."""
+"""Figures 6 and 7 of paper A: the objective against the genetic algorithm's settings, with the scatter of seeds."""
 
 import numpy as np
 import pandas as pd
@@ -10,10 +10,10 @@ from rrru.studies.rrru3.paper import CROSSOVER, DESIGN, MIGRATION, SETTINGS
 
 _SYMBOL = {"crossover_fraction": "P_c", "migration_fraction": "P_m"}
 _PRINTED = {"crossover_fraction": CROSSOVER, "migration_fraction": MIGRATION}
-# the settings that were chosen in the paper
+# the settings chosen in the paper
 _CHOSEN = {number.item: number.value for number in DESIGN}
 _POPULATIONS = {"one": "one population", "islands": "islands"}
-# the paper prints four digits: smaller differences cannot be told apart there
+# resolution of the paper's four printed digits
 _RESOLUTION_MM = 1e-4
 _GOLDEN = 0.6180339887498949
 
@@ -21,7 +21,7 @@ _GOLDEN = 0.6180339887498949
 @style.printed
 def fig06(tables, options):
     """Objective against the crossover fraction (paper A, Fig. 6). (a) The published curve with half a unit of its
-    last printed digit. (b), (c) The same algorithm run with many seeds: what every run reached above the least mean
+    last printed digit. (b), (c) The same algorithm run with many seeds: the excess of every run over the least mean
     distance, its median and quartiles, and the published curve above its own lowest value, on one axis that is
     linear below one printed digit. Open medians are worse than the best setting (Mann-Whitney, Holm, 5 %).
     """
@@ -31,7 +31,7 @@ def fig06(tables, options):
 @style.printed
 def fig07(tables, options):
     """Objective against the migration fraction (paper A, Fig. 7). (a) The published curve with half a unit of its
-    last printed digit. (b), (c) The same algorithm run with many seeds: what every run reached above the least mean
+    last printed digit. (b), (c) The same algorithm run with many seeds: the excess of every run over the least mean
     distance, its median and quartiles, and the published curve above its own lowest value, on one axis that is
     linear below one printed digit. Open medians are worse than the best setting (Mann-Whitney, Holm, 5 %).
     """
@@ -39,11 +39,11 @@ def fig07(tables, options):
 
 
 def _sweep(tables, options, parameter, name):
-    """The published curve, then for each kind of population the seeds' scatter beside it on one log axis."""
+    """The published curve, then for each kind of population the seeds' scatter, with one common log axis."""
     published = pd.Series(_PRINTED[parameter], index=[float(setting) for setting in SETTINGS])
     optimum = _optimum(tables, options, name)
-    own = {key: _shown(tables[key], parameter, options) for key in ("sweep_runs", "sweep_pairs", "sweep_effect")}
-    kinds = [kind for kind in _POPULATIONS if (own["sweep_runs"]["population"] == kind).any()]
+    frames = {key: _shown(tables[key], parameter, options) for key in ("sweep_runs", "sweep_pairs", "sweep_effect")}
+    kinds = [kind for kind in _POPULATIONS if (frames["sweep_runs"]["population"] == kind).any()]
     if not kinds:
         raise ConfigError(f"{name}: table sweep_runs has no runs of {parameter}")
     figure = style.new(style.DOUBLE_MM, 95.0)
@@ -52,7 +52,7 @@ def _sweep(tables, options, parameter, name):
     first = None
     for column, kind in enumerate(kinds, start=1):
         axes = figure.add_subplot(grid[column], sharey=first)
-        runs, pairs, effect = (frame[frame["population"] == kind] for frame in own.values())
+        runs, pairs, effect = (frame[frame["population"] == kind] for frame in frames.values())
         _scatter(axes, runs, set(pairs.loc[pairs["distinguishable"].astype(bool), "value"]), optimum)
         _published_above(axes, published)
         axes.set_title(f"({'abc'[column]}) {_POPULATIONS[kind]}\n{_test(effect, parameter)}")
@@ -72,7 +72,7 @@ def _sweep(tables, options, parameter, name):
 
 
 def _shown(frame, parameter, options):
-    """Rows of one swept parameter in the reading that the study takes, its runs going on to the end."""
+    """Rows of one swept parameter in the interpretation of the study, with runs to the end."""
     chosen = (frame["operators"] == options["sweep_operators"]) & (frame["stop"] == "end")
     return frame[chosen & (frame["parameter"] == parameter)]
 
@@ -91,7 +91,7 @@ def _optimum(tables, options, name):
 
 
 def _as_printed(axes, published):
-    """The published curve with half a unit of its last digit, on an axis of its own."""
+    """The published curve with half a unit of its last digit, on a separate axis."""
     bars = {"yerr": _RESOLUTION_MM / 2.0, "elinewidth": 0.7, "capsize": 1.5}
     axes.errorbar(published.index, published, label="published, as printed", **bars, **style.PUBLISHED)
     spread = published.max() - published.min()
@@ -108,7 +108,7 @@ def _scatter(axes, runs, apart, optimum):
     excess = runs["objective_mm"] - optimum
     finite = excess[np.isfinite(excess)].sort_values()
     groups = finite.groupby(runs["value"].reindex(finite.index))
-    # the dots stand side by side; multiples of the golden section never come close to each other
+    # sideways shifts of the dots; multiples of the golden section are well separated
     aside = 0.6 * step * (groups.cumcount() * _GOLDEN % 1.0 - 0.5)
     dots = {"linestyle": "none", "marker": ".", "markersize": 2.5, "color": style.SKY}
     label = f"one seed (optimum {optimum:.4f} mm)"
@@ -118,11 +118,11 @@ def _scatter(axes, runs, apart, optimum):
     # each bar ends in a gap
     places, ends = np.repeat(low.index, 3), np.stack([low, high, np.full(len(low), np.nan)], axis=1).ravel()
     axes.plot(places, ends, label="quartiles", zorder=3, **bars)
-    told = middle.index.isin(apart)
-    for worse in dict.fromkeys(told):
-        label = "median, worse than the best setting" if worse else "median, not told apart from the best"
+    distinguishable = middle.index.isin(apart)
+    for worse in dict.fromkeys(distinguishable):
+        label = "median, worse than the best setting" if worse else "median, not separable from the best"
         look = {"markersize": 4.0, "color": style.BLUE, "markerfacecolor": "white" if worse else style.BLUE}
-        axes.plot(middle[told == worse], "o", label=label, zorder=4, **look)
+        axes.plot(middle[distinguishable == worse], "o", label=label, zorder=4, **look)
     _settings_as_ticks(axes, values)
     if lost := len(excess) - len(finite):
         axes.text(0.03, 0.98, f"infeasible, not drawn: {lost}", transform=axes.transAxes, va="top", fontsize=7.0)
@@ -132,7 +132,7 @@ def _published_above(axes, published):
     """The published curve above its own lowest value, on an axis that is linear up to one printed digit."""
     above = published - published.min()
     axes.plot(above.index, above, label=f"published, above its own lowest, {published.min():.4f} mm", **style.PUBLISHED)
-    # so no difference is shown as one
+    # the linear part shows differences below one digit as zero
     axes.set_yscale("symlog", linthresh=_RESOLUTION_MM, linscale=0.5)
     style.plain_log(axes.yaxis)
     band = {"facecolor": "#eeeeee", "edgecolor": "none", "zorder": 0}
