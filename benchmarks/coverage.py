@@ -34,7 +34,7 @@ import pandas as pd
 from benchmarks.harness import RESULTS
 from benchmarks.virtual_campaigns import ROBOTS, SCENES, draw_truth, exact_readings, measure, virtual_campaign
 from rrru.campaign.measurements import series
-from rrru.diagnosis.diagnose import MeasuredRobot, diagnose, sim
+from rrru.diagnosis.diagnose import MeasuredRobot, diagnose, with_wide_bounds
 from rrru.diagnosis.make_problem import make_case
 from rrru.diagnosis.problem import GEOMETRY
 from rrru.diagnosis.settings import GapSettings
@@ -98,7 +98,7 @@ def state_of(campaign, frame, noise_mm, draws=_RESAMPLES):
 
 def _residual(campaign, frame, inference):
     """Residuals (n, 3) of the corrected model on another table of readings, NaN where a diagnosis rejects them."""
-    case = make_case(frame, sim(campaign.mechanism), campaign.masses, 1.0, {})
+    case = make_case(frame, with_wide_bounds(campaign.mechanism), campaign.masses, 1.0, {})
     case = replace(case, library=inference.case.library).standing(inference.state)
     return np.where(case.used[:, None], case.left(inference.state), np.nan)
 

@@ -23,7 +23,7 @@ from rrru.campaign.trajectories import Line, Spiral
 from rrru.diagnosis.make_problem import make_case
 from rrru.effects.library import find
 from rrru.effects.motion import standing
-from rrru.effects.protocol import ActiveEffect, gives_way
+from rrru.effects.protocol import ActiveEffect, is_compliant
 from rrru.kinematics.base_parameters import MeasurementConfig
 from rrru.kinematics.dynamics import Masses, carried_kg, level_axes
 from rrru.kinematics.point_masses import PLATFORM
@@ -471,7 +471,7 @@ def exact_readings(campaign, truth, fresh=False):
     case, robot = campaign.cases[fresh], campaign.mechanism
     motion, readings, effects = case.motion, case.readings, truth.effects + truth.discrepancy
     commanded = rows.actuators(case.measurements, robot), rows.command(case.measurements)
-    bearing = robot.orients and any(gives_way(active.effect) for active in effects)
+    bearing = robot.orients and any(is_compliant(active.effect) for active in effects)
     for _ in range(_ROUNDS_OF_LOADS if bearing else 1):
         twists = robot.twists(truth.deviations) + _twists(effects, motion, truth.payload)
         poses = robot.solve(*commanded, twists)
@@ -487,7 +487,7 @@ def exact_readings(campaign, truth, fresh=False):
 def _twists(effects, motion, payload):
     """Twists (n or 1, sites, 6) of active effects along a motion; compliances have the loads of the true payload."""
     heavy = motion.under(*payload.values()) if payload else motion
-    return sum((active.contribute(heavy if gives_way(active.effect) else motion).twists for active in effects), 0.0)
+    return sum((active.contribute(heavy if is_compliant(active.effect) else motion).twists for active in effects), 0.0)
 
 
 def measure(campaign, truth, generator, fresh=False):

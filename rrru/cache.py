@@ -11,7 +11,7 @@ _Owner = TypeVar("_Owner")
 _Answer = TypeVar("_Answer")
 
 
-def last_kept(method: Callable[[_Owner, Any], _Answer]) -> Callable[[_Owner, Any], _Answer]:
+def last_cached(method: Callable[[_Owner, Any], _Answer]) -> Callable[[_Owner, Any], _Answer]:
     """Cache the last result of a method of one array: a search needs derivatives where it just needed residuals."""
     name = f"_last_{method.__name__}"
 
@@ -26,7 +26,7 @@ def last_kept(method: Callable[[_Owner, Any], _Answer]) -> Callable[[_Owner, Any
     return cached
 
 
-def last_kept_of(method: Callable[[_Owner, Any], _Answer]) -> Callable[[_Owner, Any], _Answer]:
+def last_cached_of(method: Callable[[_Owner, Any], _Answer]) -> Callable[[_Owner, Any], _Answer]:
     """Cache the last result of a method of one object that never changes."""
     name = f"_last_{method.__name__}"
 

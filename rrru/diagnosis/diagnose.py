@@ -86,7 +86,7 @@ class Diagnosis:
     decided: Verdict
 
 
-def sim(mechanism: Any) -> Any:
+def with_wide_bounds(mechanism: Any) -> Any:
     """The mechanism with bounds wide enough for a gap to appear in the deviations."""
     return mechanism.widened(OPTIONS.parameter_bound_rad, OPTIONS.parameter_bound_mm)
 
@@ -101,7 +101,7 @@ def diagnose(
     """
     library = settings.library(robot.mechanism)
     stated = (KNOWN if robot.noise_known else STATED) if robot.noise_mm else UNKNOWN_NOISE
-    nominal, near = sim(robot.mechanism), settings.use_near_singularity
+    nominal, near = with_wide_bounds(robot.mechanism), settings.use_near_singularity
     arm_mm = nominal.angle_arm_mm if rows.has_turns(measurements) else np.nan
     case = make_case(measurements, nominal, robot.masses, robot.noise_mm or 1.0, library, near, arm_mm)
     case = replace(case, nuisance_sd=settings.nuisance_sd(case.nuisance_sd))

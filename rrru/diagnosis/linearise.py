@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from rrru.diagnosis.state import LinearizedProblem, State
-from rrru.effects.protocol import gives_way
+from rrru.effects.protocol import is_compliant
 from rrru.errors import FitError
 
 
@@ -73,7 +73,7 @@ def _by_shape(case, at, key, state):
 
 def _by_weight(case, at, state, columns):
     """`LinearizedProblem.by_weight` of columns, and its `weight_steps`."""
-    weight, made = case.weight(state), {key: [] for key in columns if gives_way(case.library[key[0]])}
+    weight, made = case.weight(state), {key: [] for key in columns if is_compliant(case.library[key[0]])}
     nuisance_sd = {name: sd for name, sd in case.nuisance_sd.items() if sd}
     steps = [(name, weight[name], weight[name] + sd, -weight[name] / sd) for name, sd in nuisance_sd.items()]
     for name, _, stepped, _ in steps:

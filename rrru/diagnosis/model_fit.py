@@ -13,14 +13,14 @@ from functools import cached_property
 
 import numpy as np
 
-from rrru.cache import last_kept
+from rrru.cache import last_cached
 from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.payload_nuisance import WEIGHT
 from rrru.diagnosis.problem import GEOMETRY
 from rrru.diagnosis.state import State
 from rrru.diagnosis.terms import EffectTerm, spread
 from rrru.diagnosis.whitened import discrepancy_scales, spectrum
-from rrru.effects.protocol import Contribution, gives_way
+from rrru.effects.protocol import Contribution, is_compliant
 from rrru.errors import FitError
 from rrru.estimation.estimate import Estimate
 from rrru.estimation.explain import explain_end
@@ -75,7 +75,7 @@ class EffectModel:
     @cached_property
     def _weight_names(self):
         """Names of the errors of payload and tilt, none where no term is compliant."""
-        compliant = any(gives_way(self.case.library[term.effect]) for term in self.terms)
+        compliant = any(is_compliant(self.case.library[term.effect]) for term in self.terms)
         return [name for name, sd in self.case.nuisance_sd.items() if sd] if compliant and self.signed else []
 
     @cached_property
@@ -118,7 +118,7 @@ class EffectModel:
             values[places[WEIGHT]][k] = state.weight.get(name, 0.0)
         return self.parameters.clipped(values)
 
-    @last_kept
+    @last_cached
     def state(self, values):
         """The State of a parameter vector (p,)."""
         places = self.parameters.places
@@ -136,7 +136,7 @@ class EffectModel:
         """Readings minus the exact model (m, 3) at parameter values (p,)."""
         return self.case.residual(self.state(values))
 
-    @last_kept
+    @last_cached
     def jacobian(self, values):
         """Derivative (m, 3, p) of the residual by the parameters."""
         case, state = self.case, self.state(values)
@@ -187,7 +187,7 @@ class EffectModel:
         case, step = self.case, 1e-3 * self.case.nuisance_sd[name]
         other = state.under(state.weight | {name: state.weight[name] + step})
         moved = {
-            key: other.contribution(case.library, key, case.motion) if gives_way(case.library[key[0]]) else present
+            key: other.contribution(case.library, key, case.motion) if is_compliant(case.library[key[0]]) else present
             for key, present in case.contributions(state).items()
         }
         change = sum(moved.values(), Contribution()) - case.contribution(state)

@@ -11,7 +11,7 @@ from functools import cached_property, partial
 import numpy as np
 import pandas as pd
 
-from rrru.cache import last_kept_of
+from rrru.cache import last_cached_of
 from rrru.campaign import measurements as rows
 from rrru.campaign.driven_path import follows_path, passes_points, stops
 from rrru.campaign.noise import reading_series
@@ -238,17 +238,17 @@ class Case:
         """Errors of payload and tilt of a state, by name."""
         return dict.fromkeys(self.nuisance_sd, 0.0) | state.weight
 
-    @last_kept_of
+    @last_cached_of
     def contributions(self, state):
         """What each effect of a state, (name, shape), changes along the motion."""
         return {key: state.contribution(self.library, key, self.motion) for key in state.effects}
 
-    @last_kept_of
+    @last_cached_of
     def contribution(self, state):
         """What the effects of a state change along the motion."""
         return sum(self.contributions(state).values(), Contribution())
 
-    @last_kept_of
+    @last_cached_of
     def posed(self, state):
         """Poses (N) of the exact closure corrected by a state, and the twists of deviations and effects."""
         actuators, command = self.driven

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from rrru.campaign.ingest.mastering import LARGE
+from rrru.campaign.ingest.zero_offsets import LARGE
 from rrru.campaign.noise import repeat_noise
 from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.payload_nuisance import WEIGHT

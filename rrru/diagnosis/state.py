@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from rrru.diagnosis.payload_nuisance import WEIGHT
-from rrru.effects.protocol import Contribution, gives_way, lacks_values
+from rrru.effects.protocol import Contribution, is_compliant, lacks_values
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class State:
         coordinates = self.effects[key] if coordinates is None else coordinates
         effect = library[key[0]]
         values = effect.coordinates.to_values(coordinates, shape or self.shape(library, key))
-        loaded = motion.under(*self.weight.values()) if self.weight and gives_way(effect) else motion
+        loaded = motion.under(*self.weight.values()) if self.weight and is_compliant(effect) else motion
         made = effect.contribute(loaded, values)
         if not (getattr(effect, "needs", ()) and (lacking := lacks_values(effect, motion)).any()):
             return made

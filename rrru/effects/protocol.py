@@ -250,7 +250,7 @@ def plain_coordinates(
 
 @dataclass(frozen=True, eq=False)
 class Effect:
-    """One physical effect: law(motion, values) gives the Contribution of parameter values (p,) at a Motion's points.
+    """One physical effect: effect_model(motion, values) gives the Contribution of parameter values (p,) at a Motion's points.
 
     needs: fields of Motion without which the effect model contributes nothing, "path_drive" where it depends on the
     sense in which a drive approaches a reading; along_drives: where only actuator values change, linearly in the
@@ -265,7 +265,7 @@ class Effect:
     name: str
     parameters: ParameterSet
     coordinates: Coordinates
-    law: Callable[[Motion, np.ndarray], Contribution]
+    effect_model: Callable[[Motion, np.ndarray], Contribution]
     needs: tuple[str, ...] = ()
     spoils: str = ""
     along_drives: Callable[[Motion], list[np.ndarray]] | None = None
@@ -285,7 +285,7 @@ class Effect:
 
     def contribute(self, motion: Motion, values: npt.ArrayLike) -> Contribution:
         """Changes at the points of a motion under parameter values (p,)."""
-        return self.law(motion, np.asarray(values, dtype=float))
+        return self.effect_model(motion, np.asarray(values, dtype=float))
 
 
 @dataclass(frozen=True)
@@ -324,7 +324,7 @@ def bears_load(effect: Any) -> bool:
     return not LOADS.keys().isdisjoint(effect.needs)
 
 
-def gives_way(effect: Any) -> bool:
+def is_compliant(effect: Any) -> bool:
     """Whether an effect, or the discrepancy basis, grows with the loads, so that payload and tilt matter."""
     return bears_load(effect) and not getattr(effect, "switches", False)
 

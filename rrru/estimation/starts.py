@@ -33,7 +33,7 @@ FAR_SHARE_OF_SIZE = 2e-3
 # a median residual above this share of the robot's size is that of a frame in which no search can begin
 LOST_SHARE_OF_SIZE = 0.05
 # an instrument's own frame is off by metres, of which a registration leaves thousandths; lost zero offsets of drives,
-# which `rrru.campaign.ingest.mastering` finds with the frame, leave more than this share
+# which `rrru.campaign.ingest.zero_offsets` finds with the frame, leave more than this share
 _MAX_SHARE_AFTER = 0.02
 # residual at which a reading begins to count less while zero offsets of drives are far off
 _BEND_MM = 5.0

@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from rrru.cache import last_kept
+from rrru.cache import last_cached
 from rrru.kinematics.chain import Poses, Twists, bar_pose, walk
 
 # an inverse has at most so many steps. The longest step is a share of a drive's range, or of a turn if that is less:
@@ -64,7 +64,7 @@ def inverse_kinematics(robot, place, start, twists, nearest=True):
     return np.where((left < 1e3 * _REACHED_MM)[:, None], actuators, np.nan)
 
 
-@last_kept
+@last_cached
 def followed(robot, actuators):
     """Poses (n) at actuator values (n, K), followed in short steps of the drives from the home pose; NaN where lost."""
     legs, n = robot.legs, len(actuators)

@@ -25,14 +25,14 @@ class Side:
 
     name: str
     campaign: str
-    told: dict
+    saved: dict
     frames: dict
     verdict: dict
 
     @property
     def settings(self):
         """How it was calibrated."""
-        return CalibrationSettings.from_config(self.told["calibration"])
+        return CalibrationSettings.from_config(self.saved["calibration"])
 
 
 @dataclass(frozen=True)
@@ -90,7 +90,7 @@ def _listed(sides, names):
 
 def check(first, second):
     """Raise ConfigError where the parameters of two sides are not comparable."""
-    one, other = first.told["nominal"], second.told["nominal"]
+    one, other = first.saved["nominal"], second.saved["nominal"]
     if one["name"] != other["name"]:
         raise ConfigError(f"compare: {first.name} is of a robot {one['name']}, {second.name} of {other['name']}")
     for key in sorted({*one["dimensions"], *other["dimensions"]}):

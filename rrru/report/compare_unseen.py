@@ -110,16 +110,16 @@ def _prediction_errors(place, sides, calibration):
 def _without(side, fold, calibration):
     """A side's robot and its deviations from all of its points except those of a fold."""
     measurements = side.frames["measurements"]
-    robot = setup.measured_robot(side.told["nominal"], measurements)
+    robot = setup.measured_robot(side.saved["nominal"], measurements)
     seen = _rows_of(measurements, fold)
     if not seen.any():
         return robot, deviation_vector(side.frames["parameters"], calibration, METHOD, robot)
-    arm_mm = side.told["arm_mm"] or np.nan
+    arm_mm = side.saved["arm_mm"] or np.nan
     remaining = rows.hold_out(measurements, seen)
     residuals = select(remaining, robot, side.settings.sets[calibration], side.settings.use_near_singularity, arm_mm)
     if residuals is None:
         raise FitError(f"{side.name}: too few points are left")
-    fit = calibrate(residuals, side.told["noise_mm"], side.settings.loss, side.settings.loss_scale_mm)
+    fit = calibrate(residuals, side.saved["noise_mm"], side.settings.loss, side.settings.loss_scale_mm)
     return robot, fit.deviations
 
 

@@ -7,7 +7,7 @@ import pytest
 from scipy.linalg import null_space
 from scipy.optimize import minimize
 
-from rrru.cache import last_kept
+from rrru.cache import last_cached
 from rrru.calibration.calibrate import calibrate
 from rrru.calibration.identifiability import analyse
 from rrru.calibration.mean_distance import least_mean_distance
@@ -210,7 +210,7 @@ def test_the_last_answer_is_kept_for_the_same_deviations_only():
     class Asked:
         count = 0
 
-        @last_kept
+        @last_cached
         def square(self, deviations):
             self.count += 1
             return deviations**2

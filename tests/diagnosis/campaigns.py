@@ -10,7 +10,7 @@ from rrru.calibration.calibrate import calibrate
 from rrru.campaign import measurements as rows
 from rrru.campaign.plan import make_plan
 from rrru.campaign.trajectories import Line, Spiral
-from rrru.diagnosis.diagnose import MeasuredRobot, diagnose, sim
+from rrru.diagnosis.diagnose import MeasuredRobot, diagnose, with_wide_bounds
 from rrru.diagnosis.make_problem import make_case
 from rrru.diagnosis.settings import GapSettings
 from rrru.effects.protocol import ActiveEffect
@@ -20,7 +20,7 @@ from rrru.robots.rrru3 import Rrru3
 from rrru.simulation.virtual_robot import VirtualRobot
 
 ROBOT = Rrru3()
-MODEL = sim(ROBOT)
+MODEL = with_wide_bounds(ROBOT)
 MASSES = Masses()
 # effects of many waves have tests of their own, and these campaigns do not show the others: their robot does not stop,
 # has no thermometer, and all its lengths are calibrated

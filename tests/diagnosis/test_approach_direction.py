@@ -10,7 +10,7 @@ import pytest
 from rrru.campaign import measurements as rows
 from rrru.diagnosis.approach_direction import at_reversals, read_back_jitter, rest_widths
 from rrru.diagnosis.determined import require_determined
-from rrru.diagnosis.diagnose import sim
+from rrru.diagnosis.diagnose import with_wide_bounds
 from rrru.diagnosis.inference import infer
 from rrru.diagnosis.make_problem import make_case
 from rrru.diagnosis.model_fit import fit_model
@@ -183,7 +183,7 @@ def _of_arm(frame, *names):
     """The case of an arm's table, with all that its readings determine."""
     library = {name: find(name, arms.ARM) for name in names}
     robot = as_measured(replace(arms.ARM, parameter_set="full"), frame, (), False)
-    return require_determined(make_case(frame, sim(robot), arms.MASSES, arms.NOISE_MM, library))
+    return require_determined(make_case(frame, with_wide_bounds(robot), arms.MASSES, arms.NOISE_MM, library))
 
 
 @pytest.fixture(scope="module")

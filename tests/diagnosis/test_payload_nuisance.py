@@ -15,7 +15,7 @@ from rrru.diagnosis.payload_nuisance import nuisance_priors
 from rrru.diagnosis.settings import GapSettings, check
 from rrru.diagnosis.terms import EffectTerm
 from rrru.diagnosis.whitened import DISCREPANCY_SCALES
-from rrru.effects.protocol import bears_load, gives_way
+from rrru.effects.protocol import bears_load, is_compliant
 from rrru.errors import ConfigError
 from rrru.kinematics.dynamics import Masses
 from rrru.kinematics.point_masses import PLATFORM
@@ -149,7 +149,7 @@ def test_an_arm_without_a_stated_tool_may_carry_one():
 
 def test_where_a_joint_is_loose_payload_and_tilt_are_not_fitted():
     loose = active("joint_clearance", [0.3, 0.25, 0.35])
-    assert bears_load(loose.effect) and not gives_way(loose.effect)
+    assert bears_load(loose.effect) and not is_compliant(loose.effect)
     measurements = measure((loose,), seed=3)
     result = diagnose(measurements, MeasuredRobot(ROBOT, Masses(3.0, 1.0, 0.5), 0.02), GapSettings(), details=False)
     assert result.verdict["effects"] == "joint_clearance" and not result.inference.state.weight

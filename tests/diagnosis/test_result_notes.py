@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from rrru.campaign import measurements as rows
 from rrru.diagnosis.calibrate import calibrate
-from rrru.diagnosis.diagnose import sim
+from rrru.diagnosis.diagnose import with_wide_bounds
 from rrru.diagnosis.make_problem import make_case
 from rrru.diagnosis.model_fit import fit_model
 from rrru.diagnosis.result_notes import payload_notes, undetermined_payload_notes, zero_notes
@@ -53,7 +53,7 @@ def _measured(robot, errors, generator, place_mm=None, known=True):
     frame = frame.assign(**drives, **rows.vector_columns("command", command), **rows.vector_columns("measured", seen))
     robot = robot.reading(rows.reads(frame, () if known is False else ("ball",)))
     robot = robot.seen_at(driven, command, rows.readings(frame, robot.angle_arm_mm))
-    return make_case(frame, sim(robot), Masses(0.0, 0.0, 0.0), _NOISE_MM, {})
+    return make_case(frame, with_wide_bounds(robot), Masses(0.0, 0.0, 0.0), _NOISE_MM, {})
 
 
 def _zeros(case):

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from rrru.campaign import measurements as rows
 from rrru.diagnosis.calibrate import calibrate
-from rrru.diagnosis.diagnose import sim
+from rrru.diagnosis.diagnose import with_wide_bounds
 from rrru.diagnosis.make_problem import make_case
 from rrru.diagnosis.model_fit import EffectModel, fit_named_effects
 from rrru.diagnosis.state import State
@@ -68,7 +68,7 @@ def unregistered_table(campaign):
 def case_of(campaign):
     """The DiagnosisProblem of a RandomCampaign, as of a user's file, without ingest."""
     table = unregistered_table(campaign)
-    robot = sim(setup.as_measured(campaign.robot, table, registered=True))
+    robot = with_wide_bounds(setup.as_measured(campaign.robot, table, registered=True))
     arm_mm = robot.angle_arm_mm if campaign.turn is not None else np.nan
     case = make_case(table, robot, _NO_LOADS, NOISE_MM, {}, arm_mm=arm_mm)
     return replace(case, library={FRAMES: frames(robot)})

@@ -14,8 +14,8 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from rrru.campaign.ingest.mastering import Framed
 from rrru.campaign.ingest.registration import register
+from rrru.campaign.ingest.zero_offsets import Framed
 from rrru.errors import FitError
 
 _TURNS, _STILL_MM = 300, 1e-9

@@ -12,10 +12,10 @@ import pandas as pd
 
 from rrru.campaign import measurements as rows
 from rrru.campaign.ingest.frames import Frames
-from rrru.campaign.ingest.mastering import lost_zeros
 from rrru.campaign.ingest.mistakes import Mistakes
 from rrru.campaign.ingest.sheet import COMMAND, MEASURED, TARGET, TURNS
 from rrru.campaign.ingest.spec import MM, RAD, IngestSpec
+from rrru.campaign.ingest.zero_offsets import lost_zeros
 from rrru.campaign.target_registration import TargetReadings, affine_rms, axes_by_turning, register_targets
 from rrru.errors import FitError
 from rrru.kinematics.chain import Poses

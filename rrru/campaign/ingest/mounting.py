@@ -13,9 +13,9 @@ from rrru.campaign.driven_path import stops
 from rrru.campaign.ingest.bodies import strays
 from rrru.campaign.ingest.frames import Frames
 from rrru.campaign.ingest.gross_advice import place_words
-from rrru.campaign.ingest.mastering import LARGE, lost_zeros
 from rrru.campaign.ingest.orientations import other_readings
 from rrru.campaign.ingest.sheet import MEASURED, TURNS, position_text
+from rrru.campaign.ingest.zero_offsets import LARGE, lost_zeros
 from rrru.campaign.target_registration import axes_by_turning
 from rrru.kinematics.readings import Readings
 
@@ -131,7 +131,7 @@ def _frames(sheet, named):
 
 
 def _zeros(sheet, frames, command):
-    """Lost zero offsets (K,) of the drives, see `rrru.campaign.ingest.mastering`."""
+    """Lost zero offsets (K,) of the drives, see `rrru.campaign.ingest.zero_offsets`."""
     chosen = np.flatnonzero(frames.framing)
     if len(chosen) > _MAX_ROWS:
         chosen = np.sort(np.random.default_rng(0).choice(chosen, _MAX_ROWS, replace=False))

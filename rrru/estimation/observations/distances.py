@@ -14,7 +14,7 @@ from typing import ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from rrru.cache import last_kept
+from rrru.cache import last_cached
 from rrru.errors import FitError
 from rrru.kinematics.robot import Robot
 
@@ -58,7 +58,7 @@ class Distances:
         """Inverse Cholesky factor (n-1, n-1) of the covariance, or the unit matrix where all count alike."""
         return np.eye(len(self)) if self.alike else np.linalg.inv(np.linalg.cholesky(self.covariance))
 
-    @last_kept
+    @last_cached
     def _model(self, values: FloatArray) -> FloatArray:
         """Model places (n, 3)."""
         return self.mechanism.forward(self.actuators, values)

@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
-from rrru.cache import last_kept
+from rrru.cache import last_cached
 from rrru.errors import FitError
 from rrru.estimation.parameters import Block
 from rrru.kinematics.chain import Poses
@@ -89,7 +89,7 @@ class Inclinations:
         result[self.mechanism.legs.site_numbers[WORLD]] = 0.0
         return np.asarray(result)
 
-    @last_kept
+    @last_cached
     def _poses(self, deviations: FloatArray) -> tuple[Poses, FloatArray]:
         """Poses and twists, in the robot's frame, at deviations (p,)."""
         twists = (self._directions @ deviations)[None]

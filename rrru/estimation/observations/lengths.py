@@ -20,7 +20,7 @@ from typing import ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from rrru.cache import last_kept
+from rrru.cache import last_cached
 from rrru.errors import FitError
 from rrru.estimation.observations.multilateration import MIN_DISTANCE_MM, Multilateration, row_loss
 from rrru.estimation.parameters import Parameters
@@ -108,7 +108,7 @@ class Lengths:
         readings, anchors = self.routing.shape
         return numbers[: -2 * readings].reshape(anchors, -1), numbers[-2 * readings : -readings], numbers[-readings:]
 
-    @last_kept
+    @last_cached
     def places(self, values: FloatArray) -> FloatArray:
         """Places (N, d) in mm: the measured ones, or those that fit their rows best at values (p,)."""
         if self.places_mm is not None:
@@ -127,7 +127,7 @@ class Lengths:
         """Derivative (N, k, p) of the residual by the values, the eliminated places following."""
         return self.eliminate(self.slopes(values)[0], values)
 
-    @last_kept
+    @last_cached
     def slopes(self, values: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Derivatives (N, k, p) and (N, k, d) of the residual by the values and by the row's own place."""
         ways, distance = self._distances(self.machine(values)[0], self.places(values))

@@ -10,7 +10,7 @@ from typing import ClassVar, Self
 import numpy as np
 import numpy.typing as npt
 
-from rrru.cache import last_kept
+from rrru.cache import last_cached
 from rrru.errors import FitError
 from rrru.kinematics.robot import Robot
 
@@ -65,7 +65,7 @@ class ProbedHeights:
         """Actuator values (n + 2 m, 3) of all places: the heights', then the distances' first and second ones."""
         return np.concatenate([self.height_actuators, self.distance_actuators[:, 0], self.distance_actuators[:, 1]])
 
-    @last_kept
+    @last_cached
     def places(self, deviations: FloatArray) -> FloatArray:
         """Positions (n + 2 m, 3) of the robot at `actuators` under deviations (p,)."""
         return self.mechanism.forward(self.actuators, deviations)

@@ -9,7 +9,7 @@ import numpy.typing as npt
 from scipy import linalg
 from scipy.spatial.transform import Rotation
 
-from rrru.cache import last_kept
+from rrru.cache import last_cached
 from rrru.estimation.observations.distances import require_finite
 from rrru.kinematics.robot import Robot
 
@@ -46,7 +46,7 @@ class Shape:
         motions = np.concatenate([np.tile(np.eye(3), (len(self), 1, 1)), turned], axis=1)
         return np.asarray(linalg.null_space(motions.transpose(1, 0, 2).reshape(6, -1)).T)
 
-    @last_kept
+    @last_cached
     def _aligned(self, values: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Model places (n, 3) moved onto the measured ones, the rotation (3, 3) of it and the places before."""
         places = self.mechanism.forward(self.actuators, values)

@@ -14,7 +14,7 @@ from typing import ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from rrru.cache import last_kept
+from rrru.cache import last_cached
 from rrru.errors import FitError
 from rrru.kinematics.chain import Poses
 from rrru.kinematics.readings import Readings, lacking
@@ -60,7 +60,7 @@ class TargetPositions:
         """Model positions (n, 3) of the tool without deviations."""
         return self.mechanism.forward(self.actuators, guess_mm=self.start_mm)
 
-    @last_kept
+    @last_cached
     def model(self, deviations: FloatArray) -> FloatArray:
         """Model positions (n, 3) in mm of the tool under deviations (p,)."""
         if self.mechanism.closed_form:
@@ -72,7 +72,7 @@ class TargetPositions:
         """Poses without deviations."""
         return self.mechanism.solve(self.actuators, self.start_mm)
 
-    @last_kept
+    @last_cached
     def _poses(self, deviations: FloatArray) -> tuple[Poses, FloatArray]:
         """Poses and twists under deviations (p,)."""
         twists = self.mechanism.twists(deviations)
@@ -84,7 +84,7 @@ class TargetPositions:
             return self.measured_mm - self.model(values)
         return lacking(self.mechanism, self.readings, *self._poses(values))
 
-    @last_kept
+    @last_cached
     def jacobian(self, deviations: FloatArray) -> FloatArray:
         """Derivative (m, 3, p) of the residual by the deviations (p,)."""
         if self.readings is None and self.mechanism.closed_form:

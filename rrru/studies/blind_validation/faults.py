@@ -51,13 +51,13 @@ def _leaning_base(robot):
 class Kind:
     """A kind of cause.
 
-    law: makes the Effect on our own plant from a robot, None where the cause is errors of geometric parameters;
+    effect_model: makes the Effect on our own plant from a robot, None where the cause is errors of geometric parameters;
     answer: name of the correct effect, empty where the calibration absorbs the cause, None where the library has no
     effect model of it; on: field of a Model that lists where it acts, empty for drives and the whole robot;
     typical: s.d. of such errors; more: further numbers by name, each with the interval that it is drawn from.
     """
 
-    law: Callable | None
+    effect_model: Callable | None
     answer: str | None
     on: str = ""
     typical: float = 0.0
@@ -142,23 +142,25 @@ class Fault:
 
     def moves(self, robot):
         """Whether it shows only while the robot moves; all others are measured at rest."""
-        make_effect = kind_of(self.kind).law
+        make_effect = kind_of(self.kind).effect_model
         return bool(make_effect and "drive_rate" in make_effect(robot).needs)
 
     def beyond(self, robot):
         """Whether it exceeds the bounds of the effect model that is the correct answer."""
         kind = kind_of(self.kind)
-        return bool(kind.law and kind.answer and (np.abs(self.sizes) > kind.law(robot).coordinates.most).any())
+        return bool(
+            kind.effect_model and kind.answer and (np.abs(self.sizes) > kind.effect_model(robot).coordinates.most).any()
+        )
 
     def values(self, robot):
         """Its Effect on a robot, and the effect's parameter values by name."""
-        effect = kind_of(self.kind).law(robot)
+        effect = kind_of(self.kind).effect_model(robot)
         shape = {name: self.more.get(name, value) for name, value in effect.coordinates.shapes[0].items()}
         return effect, effect.parameters.mapping(effect.coordinates.to_values(np.array(self.sizes), shape))
 
     def numbers(self, robot):
         """True values of the library's parameters by effect and name; empty where the fault has no such values."""
-        if not (kind_of(self.kind).law and kind_of(self.kind).answer) or "load_kg" in self.more:
+        if not (kind_of(self.kind).effect_model and kind_of(self.kind).answer) or "load_kg" in self.more:
             return {}
         effect, values = self.values(robot)
         return {effect.name: values}
@@ -171,14 +173,16 @@ def kinds_of(model, robot):
 
 def _fits(kind, model, robot):
     """Whether a robot has a place for a kind, and its library an effect model."""
-    return (not kind.on or len(getattr(model, kind.on)) > 0) and (not kind.law or kind.law(robot) is not None)
+    return (not kind.on or len(getattr(model, kind.on)) > 0) and (
+        not kind.effect_model or kind.effect_model(robot) is not None
+    )
 
 
 def draw_fault(name, model, robot, generator):
     """A fault of a kind with random ratios of its sizes; a third of those with several places act at one only."""
     kind = KINDS[name]
-    if kind.law:
-        coordinates = kind.law(robot).coordinates
+    if kind.effect_model:
+        coordinates = kind.effect_model(robot).coordinates
         typical, positive = coordinates.typical, coordinates.positive
         several = bool(coordinates.legs.any())
     else:

@@ -206,7 +206,7 @@ def sized(robot, fault, strength, conditions):
     Raises UnreachableError where a calibration absorbs it, where a pose is lost, or where that strength exceeds the
     bounds of its effect model.
     """
-    if kind_of(fault.kind).law is None:
+    if kind_of(fault.kind).effect_model is None:
         return fault
     still = residual(noise_free(replace(robot, plant="own", acting=()), conditions), conditions)
     for _ in range(_STEPS):

@@ -23,7 +23,7 @@ def own(conditions, offsets, *faults):
     deviations = {one.name: offset for one, offset in zip(robot.candidates, offsets, strict=False)}
     for fault in faults:
         kind = kind_of(fault.kind)
-        if kind.law:
+        if kind.effect_model:
             effects.append(ActiveEffect(*fault.values(conditions.mechanism)))
         else:
             for error, size in zip(getattr(conditions.model, kind.on), fault.sizes, strict=True):
@@ -61,7 +61,7 @@ def drives(robot):
 def mujoco_causes(conditions, fault):
     """Sizes by site by the name of a cause, as `rrru.simulation.mujoco_causes` has them, of a Fault."""
     model, named = conditions.model, drives(conditions.mechanism)
-    if not KINDS[fault.kind].law:
+    if not KINDS[fault.kind].effect_model:
         errors = _acting(getattr(model, KINDS[fault.kind].on), fault.sizes)
         return {"placement": {place: size for error, size in errors for place, _ in error}}
     if fault.kind == "warming":

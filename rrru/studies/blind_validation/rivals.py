@@ -17,7 +17,7 @@ from scipy.linalg import solve_triangular
 from rrru.calibration.calibrate import calibrate
 from rrru.calibration.campaign_fit import select
 from rrru.campaign import measurements as rows
-from rrru.diagnosis.diagnose import sim
+from rrru.diagnosis.diagnose import with_wide_bounds
 from rrru.diagnosis.make_problem import make_case
 from rrru.diagnosis.problem import Case
 from rrru.diagnosis.state import State
@@ -54,7 +54,7 @@ class Campaign:
     @classmethod
     def of(cls, measurements, known, library):
         """The campaign of a measurement table of a MeasuredRobot, linearised about its calibration."""
-        mechanism = sim(known.mechanism)
+        mechanism = with_wide_bounds(known.mechanism)
         case = make_case(measurements, mechanism, known.masses, known.noise_mm, library)
         calibrated = State(calibrate(select(measurements, mechanism, ["*"])).deviations, {})
         # the diagnosis searches the waves of effects with many coefficients; these have no fixed signatures

@@ -77,7 +77,7 @@ def _cause(robot, name, generator, conditions):
 
     A cause that a calibration absorbs to first order is dropped: its gap does not double with its size.
     """
-    coordinates = kind_of(name).law(conditions.mechanism).coordinates
+    coordinates = kind_of(name).effect_model(conditions.mechanism).coordinates
     for _ in range(_TRIES):
         strength = float(np.exp(generator.uniform(*np.log(MANY))))
         one = draw_direction(name, coordinates, False, strength, generator)

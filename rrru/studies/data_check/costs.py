@@ -5,7 +5,7 @@ import numpy as np
 from rrru.campaign import measurements as rows
 from rrru.campaign.noise import ENOUGH_REPEATS, read_noise, repeat_noise
 from rrru.diagnosis.determined import poses_needed, require_determined
-from rrru.diagnosis.diagnose import sim
+from rrru.diagnosis.diagnose import with_wide_bounds
 from rrru.diagnosis.make_problem import make_case
 from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.settings import GapSettings
@@ -36,7 +36,13 @@ def costs(measurements, config, section):
         library = GapSettings.from_config(config["gap"]).library(robot)
         masses = Masses(**parts.masses(config, section))
         case = make_case(
-            measurements, sim(robot), masses, section.get("noise_mm") or 1.0, library, True, robot.angle_arm_mm
+            measurements,
+            with_wide_bounds(robot),
+            masses,
+            section.get("noise_mm") or 1.0,
+            library,
+            True,
+            robot.angle_arm_mm,
         )
     except RrruError as error:
         return [*said, f"no diagnosis: {error}"]

@@ -16,7 +16,7 @@ import pandas as pd
 from rrru.campaign import measurements as rows
 from rrru.campaign.ingest.campaign_file import ingest
 from rrru.campaign.ingest.spec import IngestSpec
-from rrru.diagnosis.diagnose import Diagnosis, MeasuredRobot, diagnose, sim
+from rrru.diagnosis.diagnose import Diagnosis, MeasuredRobot, diagnose, with_wide_bounds
 from rrru.diagnosis.inference import with_arm
 from rrru.diagnosis.make_problem import make_case
 from rrru.diagnosis.problem import Case
@@ -174,7 +174,11 @@ def _check_joints(series: Series, joints: Mapping[str, str], mechanism: Robot) -
 
 def _reference(known: Prepared) -> tuple[Case, tuple[Step, ...]]:
     """The case of the reference models of a series, and these models, each fitted to its training rows."""
-    nominal, measurements, turned = sim(known.robot), known.measurements, rows.has_turns(known.measurements)
+    nominal, measurements, turned = (
+        with_wide_bounds(known.robot),
+        known.measurements,
+        rows.has_turns(known.measurements),
+    )
     arm_mm = nominal.angle_arm_mm if turned else np.nan
     case = make_case(measurements, nominal, NO_MASSES, known.noise[0] or 1.0, library_effects(nominal), True, arm_mm)
     if turned:

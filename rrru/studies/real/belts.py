@@ -23,7 +23,7 @@ from scipy import linalg
 from rrru.estimation.observations.length_starts import propose_anchors
 from rrru.estimation.observations.lengths import Lengths
 from rrru.studies.real import length_tables
-from rrru.studies.real.length_laws import UNEXPLAINED, LengthCase, frame_columns, variants_of
+from rrru.studies.real.length_models import UNEXPLAINED, LengthCase, frame_columns, variants_of
 from rrru.studies.real.lengths_section import MM, Section, held_out, numbers, row_numbers
 
 MISSING, SCALE = "missing_length", "length_scale"
@@ -112,9 +112,16 @@ def _starts(lengths):
 
 def _chain(case, chosen):
     """Combinations of effect models in the order of the steps, the verdict's last."""
-    common, each = case.laws[MISSING][0], case.laws[MISSING][-1]
-    missing = [effect_model for effect_model in chosen.laws if effect_model.effect == MISSING] or [common]
-    chain = [(), (common,), (each,), (*missing, *case.laws[SCALE]), case.laws[SCALE], chosen.laws]
+    common, each = case.effect_models[MISSING][0], case.effect_models[MISSING][-1]
+    missing = [effect_model for effect_model in chosen.effect_models if effect_model.effect == MISSING] or [common]
+    chain = [
+        (),
+        (common,),
+        (each,),
+        (*missing, *case.effect_models[SCALE]),
+        case.effect_models[SCALE],
+        chosen.effect_models,
+    ]
     return list(dict.fromkeys(chain))
 
 
@@ -126,8 +133,8 @@ def _first_missing(hypothesis):
 
 def _common(case, chosen):
     """The Hypothesis of one common missing length together with the other effect models of the chosen one."""
-    others = [effect_model for effect_model in chosen.laws if effect_model.effect != MISSING]
-    return case.hypothesis([case.laws[MISSING][0], *others])
+    others = [effect_model for effect_model in chosen.effect_models if effect_model.effect != MISSING]
+    return case.hypothesis([case.effect_models[MISSING][0], *others])
 
 
 def _parameters(case, chosen, belts):
@@ -169,7 +176,7 @@ def _words(case, verdict, belts):
     effects, _, chosen = verdict
     notes, where, rivals = [], [], []
     if MISSING in effects:
-        effect_model = next(effect_model for effect_model in chosen.laws if effect_model.effect == MISSING)
+        effect_model = next(effect_model for effect_model in chosen.effect_models if effect_model.effect == MISSING)
         where.append(effect_model.where)
         notes.append(_missing_words(case, chosen, effect_model, belts))
         if case.probability_of(lambda effect_models: effect_model in effect_models) < 0.9 * case.probability_of(
@@ -215,7 +222,7 @@ def _missing_words(case, chosen, effect_model, belts):
     _, missing, _ = chosen.fit.lengths.machine(chosen.fit.values)
     error = chosen.fit.lengths.split(chosen.standard_errors)[1]
     acting = np.flatnonzero(error > 0.0)
-    if effect_model is case.laws[MISSING][0]:
+    if effect_model is case.effect_models[MISSING][0]:
         side = "longer" if missing[0] > 0.0 else "shorter"
         said = f"Every belt is {abs(missing[0]):.1f} +- {error[0]:.1f} mm {side} than counted"
         independent = _independent_error(chosen)
@@ -226,7 +233,7 @@ def _missing_words(case, chosen, effect_model, belts):
             f" {'longer' if missing[k] > 0.0 else 'shorter'} than counted"
             for k in acting
         )
-    without = case.hypothesis([other for other in chosen.laws if other.effect != MISSING])
+    without = case.hypothesis([other for other in chosen.effect_models if other.effect != MISSING])
     if without is None:
         return f"{said}."
     sizes = [_size_mm(one.fit) for one in (without, chosen)]

@@ -24,7 +24,7 @@ import pandas as pd
 
 from rrru.estimation.observations.lengths import Lengths
 from rrru.studies.real import length_tables
-from rrru.studies.real.length_laws import UNEXPLAINED, LengthCase, variants_of
+from rrru.studies.real.length_models import UNEXPLAINED, LengthCase, variants_of
 from rrru.studies.real.lengths_section import MM, RAD, Section, held_out, numbers, row_numbers
 
 RADIUS = "drum_radius"
@@ -46,8 +46,8 @@ def study(frame, section, name):
     case, drums, anchors = cable_case(frame, read)
     verdict = case.verdict()
     chosen = verdict[2]
-    effect_models = case.laws[RADIUS]
-    chain = list(dict.fromkeys([(), (effect_models[0],), (effect_models[-1],), chosen.laws]))
+    effect_models = case.effect_models[RADIUS]
+    chain = list(dict.fromkeys([(), (effect_models[0],), (effect_models[-1],), chosen.effect_models]))
     steps, errors = length_tables.steps(case, chain, held_out(frame, read))
     notes, where, next_runs, rivals = _words(case, verdict, drums)
     row = length_tables.verdict_row(case, verdict, errors, where=where, confusable_with=rivals, next_runs=next_runs)
@@ -154,7 +154,7 @@ def _parameters(case, chosen, drums, anchors):
         parameter(f"{drum}_start", "mm", start[k], start_errors[k], np.nan, "cable at the drum's zero")
         for k, drum in enumerate(drums)
     ]
-    free = case.hypothesis([case.laws[RADIUS][-1]])
+    free = case.hypothesis([case.effect_models[RADIUS][-1]])
     if free is None:
         return rows
     note = "" if free is chosen else "with all radii free, which is not the verdict"
@@ -169,11 +169,11 @@ def _parameters(case, chosen, drums, anchors):
 def _words(case, verdict, drums):
     """Notes (sentences), where, next_runs and confounded effects of a verdict."""
     effects, _, chosen = verdict
-    possible, poses = case.laws[RADIUS], len(case.used)
+    possible, poses = case.effect_models[RADIUS], len(case.used)
     off = case.probability_of(lambda effect_models: bool(effect_models))
     notes, where, rivals, runs = [], "", [], []
     if RADIUS in effects:
-        effect_model = chosen.laws[0]
+        effect_model = chosen.effect_models[0]
         settled = case.probability_of(lambda effect_models: effect_model in effect_models) > 0.9 * off
         where = effect_model.where if settled else ""
         changed = chosen.fit.lengths.machine(chosen.fit.values)[2] - case.bare.origin[-len(drums) :]

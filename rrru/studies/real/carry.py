@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 
 from rrru.campaign import measurements as rows
-from rrru.diagnosis.diagnose import sim
+from rrru.diagnosis.diagnose import with_wide_bounds
 from rrru.diagnosis.discrepancy_basis import UNKNOWN
 from rrru.diagnosis.make_problem import make_case
 from rrru.diagnosis.payload_nuisance import WEIGHT
@@ -97,7 +97,7 @@ def carried(models: Sequence[Model]) -> pd.DataFrame:
 
 def _row(first: Model, second: Model) -> dict:
     """The row of the model of one series on another one."""
-    robot = sim(first.robot)
+    robot = with_wide_bounds(first.robot)
     arm_mm = second.arm_mm if rows.has_turns(second.measurements) else np.nan
     case = make_case(second.measurements, robot, NO_MASSES, second.noise_mm, {}, True, arm_mm)
     effects = {

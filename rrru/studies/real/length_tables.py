@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 
-from rrru.studies.real.length_laws import UNEXPLAINED, predict_held_out
+from rrru.studies.real.length_models import UNEXPLAINED, predict_held_out
 
 # most rows that a note names
 _NAMED = 10
@@ -64,10 +64,10 @@ def steps(case, chain, held_out):
 def verdict_row(case, verdict, errors, *, where, confusable_with, next_runs):
     """The row of real_verdicts without notes; errors: of the steps, with those of the bare frame and of the verdict."""
     effects, probability, chosen = verdict
-    before, after = errors.get((), errors[chosen.laws]), errors[chosen.laws]
+    before, after = errors.get((), errors[chosen.effect_models]), errors[chosen.effect_models]
     noise = chosen.noise_mm if UNEXPLAINED in effects else chosen.fit.noise_mm
     gaps = [float(np.sqrt(max(rms(errors_mm) ** 2 - noise**2, 0.0))) for errors_mm in (before, after)]
-    closed = share_closed(before, after, noise) if chosen.laws else (0.0, 0.0, 0.0)
+    closed = share_closed(before, after, noise) if chosen.effect_models else (0.0, 0.0, 0.0)
     return {
         "effects": "+".join(effects) or "none",
         "probability": probability,

@@ -79,7 +79,7 @@ def test_the_right_answer_is_a_law_that_the_diagnosis_tries_or_none(kind):
     fault, robot = _fault(file, kind), conditions(file).mechanism
     if fault.outside:
         assert fault.truth == f"{PREFIX}:{kind}" and fault.effect == kind and not fault.numbers(robot)
-    elif KINDS[kind].law is None:
+    elif KINDS[kind].effect_model is None:
         assert fault.truth == NONE and not fault.effect
         own = short("own", file, (fault,))
         gap = np.linalg.norm(foreign.residual(foreign.noise_free(own, conditions(file)), conditions(file)), axis=1)

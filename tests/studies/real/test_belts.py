@@ -168,12 +168,12 @@ def test_measured_machine(run, truth, rms_mm, anchors):
     case, _ = belts.length_case(frame, Section(MASLOW, "maslow", belts._NEEDED, belts._OPTIONAL))
     everything = np.ones(case.bare.counted.shape, dtype=bool)
     for effect_models, expected in zip(
-        ((), case.laws["missing_length"][:1], case.laws["missing_length"][-1:]), rms_mm, strict=True
+        ((), case.effect_models["missing_length"][:1], case.effect_models["missing_length"][-1:]), rms_mm, strict=True
     ):
         model = case.model(effect_models)
         fit = fit_lengths(model, case.starts(model), everything)
         assert fit.rms_mm == pytest.approx(expected, abs=0.006)
-        if effect_models == case.laws["missing_length"][:1]:
+        if effect_models == case.effect_models["missing_length"][:1]:
             np.testing.assert_allclose(fit.values[:5], anchors, atol=0.06)
             assert fit.standard_errors[-8] == pytest.approx(3.1, abs=0.05)
     tables = belts.study(frame, MASLOW, "maslow")
@@ -183,7 +183,7 @@ def test_measured_machine(run, truth, rms_mm, anchors):
     error = _value(tables, "missing_length", "standard_error")
     assert abs(_value(tables, "missing_length") - truth) < 2.0 * error
     # neighbouring rows err alike: rows left out one area after another tell what that is worth
-    chosen = [*case.laws["missing_length"][:1], *case.laws["length_scale"]]
+    chosen = [*case.effect_models["missing_length"][:1], *case.effect_models["length_scale"]]
     assert error == pytest.approx(_jackknife(case.hypothesis(chosen).fit), rel=0.3)
 
 

@@ -101,7 +101,7 @@ def test_measured_robot():
     frame = simulated.measured("planar_cables/poses.csv")
     section = SECTION | {"row": "pose"}
     case, _, _ = cables.cable_case(frame, Section(section, "kamal", cables._NEEDED, cables._OPTIONAL))
-    expected = {(): (2.06, 1.76, 2.36), case.laws["drum_radius"][-1:]: (1.15, 1.49, 1.53)}
+    expected = {(): (2.06, 1.76, 2.36), case.effect_models["drum_radius"][-1:]: (1.15, 1.49, 1.53)}
     for effect_models, rms_mm in expected.items():
         model = case.model(effect_models)
         fit = fit_lengths(model, case.starts(model), np.ones((16, 3), dtype=bool))

@@ -61,7 +61,7 @@ class Hypothesis:
     independent: with noise alone; smooth: with noise and a smooth discrepancy.
     """
 
-    laws: tuple
+    effect_models: tuple
     fit: LengthFit
     independent: MarginalLikelihood | None
     smooth: MarginalLikelihood | None
@@ -69,7 +69,7 @@ class Hypothesis:
     @property
     def effects(self):
         """Names of the effects of its effect models."""
-        return tuple(effect_model.effect for effect_model in self.laws)
+        return tuple(effect_model.effect for effect_model in self.effect_models)
 
     @property
     def correlated(self):
@@ -105,12 +105,12 @@ class Hypothesis:
 class LengthCase:
     """Model selection problem of a set of lengths.
 
-    bare: Lengths of the frame without effect models. laws: {effect: EffectModels}, of which at most one per effect
+    bare: Lengths of the frame without effect models. effect_models: {effect: EffectModels}, of which at most one per effect
     acts. starts: function of Lengths that yields start values (p,).
     """
 
     bare: Lengths
-    laws: dict
+    effect_models: dict
     starts: Callable
 
     def model(self, effect_models):
@@ -127,7 +127,7 @@ class LengthCase:
     @cached_property
     def _judged(self):
         """The fit that judges the readings: with as many effect models as the readings determine."""
-        largest = [max(ways, key=lambda effect_model: len(effect_model.ranges)) for ways in self.laws.values()]
+        largest = [max(ways, key=lambda effect_model: len(effect_model.ranges)) for ways in self.effect_models.values()]
         for count in range(len(largest), -1, -1):
             model = self.model(largest[:count])
             if count and model.redundancy < model.basis.shape[1]:
@@ -158,7 +158,7 @@ class LengthCase:
         acting = {effect_model.effect for effect_model in effect_models}
         absent = [
             1.0 - sum(effect_model.believed for effect_model in ways)
-            for effect, ways in self.laws.items()
+            for effect, ways in self.effect_models.items()
             if effect not in acting
         ]
         return float(np.prod([effect_model.believed for effect_model in effect_models]) * np.prod(absent))
@@ -171,7 +171,7 @@ class LengthCase:
         probability. Raises FitError where none can be fitted.
         """
         combinations = [()]
-        for ways in self.laws.values():
+        for ways in self.effect_models.values():
             combinations += [(*effect_models, effect_model) for effect_models in combinations for effect_model in ways]
         found, logs, untried = [], [], 0.0
         for effect_models in combinations:
@@ -207,11 +207,11 @@ class LengthCase:
     def probability_of(self, asked):
         """Total probability of the combinations for which asked(effect_models) is true."""
         found, probability = self.hypotheses
-        return float(sum(row.sum() for one, row in zip(found, probability, strict=True) if asked(one.laws)))
+        return float(sum(row.sum() for one, row in zip(found, probability, strict=True) if asked(one.effect_models)))
 
     def hypothesis(self, effect_models):
         """The Hypothesis of some effect models, None where it cannot be fitted."""
-        return next((one for one in self.hypotheses[0] if one.laws == tuple(effect_models)), None)
+        return next((one for one in self.hypotheses[0] if one.effect_models == tuple(effect_models)), None)
 
 
 def variants_of(effect, variants, prior_sd):
