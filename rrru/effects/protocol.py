@@ -250,7 +250,8 @@ def plain_coordinates(
 
 @dataclass(frozen=True, eq=False)
 class Effect:
-    """One physical effect: effect_model(motion, values) gives the Contribution of parameter values (p,) at a Motion's points.
+    """One physical effect: effect_model(motion, values) gives the Contribution of parameter values (p,) at a Motion's
+    points.
 
     needs: fields of Motion without which the effect model contributes nothing, "path_drive" where it depends on the
     sense in which a drive approaches a reading; along_drives: where only actuator values change, linearly in the

@@ -51,10 +51,10 @@ def _leaning_base(robot):
 class Kind:
     """A kind of cause.
 
-    effect_model: makes the Effect on our own plant from a robot, None where the cause is errors of geometric parameters;
-    answer: name of the correct effect, empty where the calibration absorbs the cause, None where the library has no
-    effect model of it; on: field of a Model that lists where it acts, empty for drives and the whole robot;
-    typical: s.d. of such errors; more: further numbers by name, each with the interval that it is drawn from.
+    effect_model: makes the Effect on our own plant from a robot, None where the cause is errors of geometric
+    parameters; answer: name of the correct effect, empty where the calibration absorbs the cause, None where the
+    library has no effect model of it; on: field of a Model that lists where it acts, empty for drives and the whole
+    robot; typical: s.d. of such errors; more: further numbers by name, each with the interval that it is drawn from.
     """
 
     effect_model: Callable | None

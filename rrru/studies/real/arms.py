@@ -174,11 +174,8 @@ def _check_joints(series: Series, joints: Mapping[str, str], mechanism: Robot) -
 
 def _reference(known: Prepared) -> tuple[Case, tuple[Step, ...]]:
     """The case of the reference models of a series, and these models, each fitted to its training rows."""
-    nominal, measurements, turned = (
-        with_wide_bounds(known.robot),
-        known.measurements,
-        rows.has_turns(known.measurements),
-    )
+    nominal, measurements = with_wide_bounds(known.robot), known.measurements
+    turned = rows.has_turns(measurements)
     arm_mm = nominal.angle_arm_mm if turned else np.nan
     case = make_case(measurements, nominal, NO_MASSES, known.noise[0] or 1.0, library_effects(nominal), True, arm_mm)
     if turned:

@@ -105,8 +105,8 @@ class Hypothesis:
 class LengthCase:
     """Model selection problem of a set of lengths.
 
-    bare: Lengths of the frame without effect models. effect_models: {effect: EffectModels}, of which at most one per effect
-    acts. starts: function of Lengths that yields start values (p,).
+    bare: Lengths of the frame without effect models. effect_models: {effect: EffectModels}, of which at most one per
+    effect acts. starts: function of Lengths that yields start values (p,).
     """
 
     bare: Lengths
