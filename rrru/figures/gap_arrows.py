@@ -13,6 +13,8 @@ _MOST_ARROWS = 400
 # the largest arrow over the width of the view, and the size that the scale holds; single larger ones may stand out
 _ARROW_SHARE, _LARGEST_PERCENT = 0.08, 99.0
 _MARGIN = 0.03
+# points of a path are nearer to each other than this share of the workspace
+_PATH_SHARE = 0.2
 _ARROW = {"width": 0.0035, "headwidth": 3.5, "headlength": 4.0, "headaxislength": 3.5}
 _RING = {"color": style.VERMILION, "marker": "o", "markersize": 9.0, "markerfacecolor": "none", "markeredgewidth": 1.4}
 
@@ -63,10 +65,17 @@ def fit(figure, panels, points):
 
 
 def _view(axes, points, shown, plane, scale, factor, z_down):
-    """One view: the paths as grey lines, the gap's part in the plane as arrows coloured by its size in space."""
+    """One view: the paths as grey lines, the gap's part in the plane as arrows coloured by its size in space.
+
+    Lines between poses in no order would show nothing and hide the arrows.
+    """
     across, up = (f"command_{axis}_mm" for axis in plane)
+    span = max(np.ptp(points[f"command_{axis}_mm"]) for axis in "xyz") if len(points) else 0.0
     for _, run in points.groupby("run", sort=False):
-        axes.plot(run[across], run[up], color="#cccccc", linewidth=0.5, zorder=1)
+        place = run[[f"command_{axis}_mm" for axis in "xyz"]].to_numpy(dtype=float)
+        steps = np.linalg.norm(np.diff(place, axis=0), axis=1)
+        if len(steps) and np.median(steps) < _PATH_SHARE * span:
+            axes.plot(run[across], run[up], color="#cccccc", linewidth=0.5, zorder=1)
     columns = (across, up, *(f"before_{axis}_mm" for axis in plane), "before_mm")
     size = {"angles": "xy", "scale_units": "xy", "scale": 1.0 / factor, "cmap": shades(), "norm": scale}
     arrows = axes.quiver(*shown[list(columns)].to_numpy().T, **size, **_ARROW, zorder=3)

@@ -2,13 +2,15 @@
 drawn too.
 """
 
+from itertools import combinations
+
 import numpy as np
 import pandas as pd
 import pytest
 from matplotlib.colors import to_hex
 
 from rrru.errors import ConfigError
-from rrru.figures import style
+from rrru.figures import gap_budget, style
 from rrru.store import tables
 from rrru.studies.blind_validation import figures as withheld
 from rrru.studies.blind_validation.verdicts import PLANTS
@@ -294,3 +296,23 @@ def test_the_error_of_every_drive_is_drawn_with_its_band_and_its_worst_place(fra
 def test_without_an_error_over_a_drive_s_value_the_figure_says_so(frames):
     figure = draw("drive_functions", frames | {"gap_drive_functions": frames["gap_drive_functions"].iloc[:0]})
     assert figure.texts[0].get_text() == "no effect over a drive's value was found"
+
+
+@pytest.mark.parametrize("covariance", [-0.55, 0.2])
+def test_names_of_the_budget_neither_overlap_nor_leave_the_bar(covariance):
+    """With small parts next to each other, and with covariances left of 0."""
+    parts = {"transmission_error": 0.09, "drive_error_function": 0.088, "backlash": 0.05, "base_drift": 0.035}
+    rows = [(name, "effect", share) for name, share in parts.items()]
+    rows += [("unexplained", "unexplained", 0.04), ("calibration", "calibration", 0.16)]
+    rows += [("both", "covariance", covariance), ("sampling", "sampling", 0.5)]
+    table = pd.DataFrame(rows, columns=["part", "kind", "share"])
+    table = table.assign(share_low=0.5 * table["share"], share_high=1.5 * table["share"])
+    with style.print_style():
+        figure = style.new(style.DOUBLE_MM, 30.0)
+        axes = figure.subplots()
+        gap_budget.draw(axes, table)
+        figure.canvas.draw()
+        boxes, bar = [text.get_window_extent() for text in axes.texts], axes.get_window_extent()
+    assert len(boxes) == len(table)
+    assert all(bar.x0 - 1.0 <= box.x0 and box.x1 <= bar.x1 + 1.0 for box in boxes)
+    assert not any(one.overlaps(other) for one, other in combinations(boxes, 2))
