@@ -129,6 +129,9 @@ def _headline(verdict, causes, words):
     # of a group alone that one of it acts, else of exactly these
     alone = causes.loc[causes["effect"] == verdict["effects"], "group_probability"].dropna()
     sure = _probability(alone.iloc[0] if len(alone) else verdict["probability"], "= ", " ")
+    single = causes[causes["effect"].isin(set(verdict["effects"].split("+")) - groups.keys())]
+    if (single["decision"] == "possible").any():
+        name = f"no cause named, most probable {name}"
     first = f"{name} (p {sure}): {style.number(verdict['gap_rms_mm'])} mm gap, {closed}"
     place = ", ".join(f"{axis} {verdict[f'worst_{axis}_mm']:.0f}" for axis in "xyz").replace("-", "\N{MINUS SIGN}")
     facts = [f"noise {style.number(verdict['noise_rms_mm'])} mm", f"worst region {place} mm"]

@@ -106,6 +106,14 @@ def test_a_group_alone_has_its_own_probability_in_the_headline(frames):
     assert "confusable" not in " ".join(rest)
 
 
+def test_the_headline_names_no_cause_where_none_is_probable_enough(frames):
+    causes = frames["gap_attribute"].copy()
+    causes.loc[causes["effect"] == "backlash", "decision"] = "possible"
+    verdicts = frames["gap_verdicts"].assign(effects="backlash", leg=0, probability=0.33)
+    bold, *_ = written(draw("gap", frames | {"gap_attribute": causes, "gap_verdicts": verdicts}).axes[0])
+    assert bold.startswith("no cause named, most probable backlash (p = 0.33): 0.37 mm gap")
+
+
 def test_causes_are_ordered_and_the_verdict_s_are_in_colour(frames):
     axes = panel(draw("gap", frames), "(b)")
     names = [label.get_text() for label in axes.get_yticklabels()]
