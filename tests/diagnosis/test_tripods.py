@@ -53,7 +53,10 @@ def test_a_3_ptts_cause_is_named(effects, named):
     assert set(found.verdict["effects"].split("+")) == named
     if effects:
         # a payload's compliance and offsets of the runs look alike where every run has a payload of its own
-        assert found.verdict["probability"] > 0.8 and found.verdict["share_closed"] > 0.8
+        # a lead error of single slides may act besides tilted rails
+        assert all(found.inference.posterior.marginal(name) > 0.95 for name in named)
+        assert found.verdict["probability"] > (0.6 if "rail_tilt" in named else 0.8)
+        assert found.verdict["share_closed"] > 0.8
     for name, frame in found.tables.items():
         check(name, frame if name == "gap_points" else frame.assign(campaign="test"))
 

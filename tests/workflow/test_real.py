@@ -41,8 +41,8 @@ def test_the_series_that_is_there_has_a_verdict_steps_and_pages(folder):
 def test_what_is_not_there_is_left_out_with_a_message(folder):
     _, said = folder
     for name in ("irb120", "justin", "maslow", "planar_cables"):
-        assert f"real.sets.{name}: no " in said
-    assert "RRRU_REAL_DATA may name" in said
+        assert f"real.sets.{name}: skipped, no " in said
+    assert "set RRRU_REAL_DATA to its folder" in said
 
 
 def test_a_file_that_is_refused_has_a_row_that_says_why(folder):

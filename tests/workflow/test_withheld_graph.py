@@ -77,7 +77,7 @@ def _modules(script):
 @pytest.mark.parametrize("script", ["withheld_diagnose", "withheld_beliefs", "diagnose"])
 def test_no_code_of_the_diagnosis_knows_how_robots_are_drawn(script):
     modules = _modules(script)
-    assert {("gap", "diagnose"), ("gap", "case")} <= modules
+    assert {("diagnosis", "diagnose"), ("diagnosis", "problem")} <= modules
     # of the study that draws the robots only how verdicts and corrected sims are written down, and other ways to them
     own = {
         "__init__",
@@ -87,6 +87,6 @@ def test_no_code_of_the_diagnosis_knows_how_robots_are_drawn(script):
         "states",
         *(("beliefs", "rivals", "verdicts") if "beliefs" in script else ()),
     }
-    assert {name for package, name in modules if package == "withheld"} <= own
+    assert {name for package, name in modules if package == "blind_validation"} <= own
     # and the walk would see them
     assert {("withheld", name) for name in ("draw", "robots", "outside")} <= _modules("withheld_score")

@@ -212,6 +212,8 @@ def _refuse_scattered(sheet, poses, rotation):
     allowed = f"at most {_MOST_SCATTERED_RAD:g} rad"
     if others[best] < _FAR_LESS * scatter:
         allowed += f"; {best} leaves {others[best]:.2g} rad"
+    else:
+        allowed += "; check unit, sequence and order of their columns"
     sheet.refuse_now(TURNS["measured"], value, allowed)
 
 

@@ -192,7 +192,7 @@ def _halved(table):
     [
         (_scalar_first, r"columns: \{measured_qx: measured_qy, measured_qy: measured_qz, measured_qz: measured_qw"),
         (_inverse, "not its inverse leaves"),
-        (_halved, "at most 0.1 rad$"),
+        (_halved, "at most 0.1 rad; check unit, sequence and order of their columns$"),
     ],
 )
 def test_orientations_that_turn_otherwise_than_the_platform_are_refused(

@@ -79,7 +79,7 @@ def test_a_far_off_held_out_reading_is_named(tmp_path):
     reading = "row 41 of tcp"
     assert (
         f"far off among those held out: {reading}; without: 0.0" in row["notes"]
-        or f"left out of fits: {reading}" in row["notes"]
+        or f"in the table but not in fits: {reading}" in row["notes"]
     )
 
 
@@ -105,7 +105,12 @@ def test_joints_have_to_be_the_robots(tmp_path):
 def test_orientations_have_to_fit_the_positions(tmp_path):
     reading = simulated_arm.section()["readings"]["tcp"]
     for change in ({"sequence": "XYZ"}, {"rotation_unit": "rad"}):
-        _refused(tmp_path, "log_x.csv: orientations have errors of", readings={"tcp": reading | change})
+        _refused(
+            tmp_path,
+            r"log_x.csv, column measured_rx_rad.*: got orientations that differ by",
+            error=IngestError,
+            readings={"tcp": reading | change},
+        )
 
 
 def test_wrong_units_and_rows_that_come_twice_are_refused_by_the_files_names(tmp_path):
