@@ -89,4 +89,4 @@ def test_no_code_of_the_diagnosis_knows_how_robots_are_drawn(script):
     }
     assert {name for package, name in modules if package == "blind_validation"} <= own
     # and the walk would see them
-    assert {("withheld", name) for name in ("draw", "robots", "outside")} <= _modules("withheld_score")
+    assert {("blind_validation", name) for name in ("draw", "robots", "outside")} <= _modules("withheld_score")
