@@ -16,13 +16,13 @@ report: .venv/ready
 
 # two folders of results, or two campaigns of results: make compare A=field_01 B=field_09
 compare: .venv/ready
-	@$(BIN)/python -m rrru.report.compare_page "$(A)" "$(B)" results/compare.html
+	@$(BIN)/rrru compare "$(A)" "$(B)" --page results/compare.html
 
 # what is in a file of measurements: make check-data FILE=tracker.csv ROBOT=rrru3 [COMMANDS=commands.csv] [CONFIG=mine.yaml]
 check-data: .venv/ready
 	$(if $(FILE),,$(error say which file: make check-data FILE=tracker.csv ROBOT=rrru3))
-	@$(BIN)/python -m rrru.studies.data_check.check_data "$(FILE)" $(if $(ROBOT),--robot "$(ROBOT)") \
-	  $(if $(COMMANDS),--commands "$(COMMANDS)") $(if $(CONFIG),--configfile $(CONFIG))
+	@$(BIN)/rrru check "$(FILE)" $(if $(ROBOT),--robot "$(ROBOT)") \
+	  $(if $(COMMANDS),--commands "$(COMMANDS)") --config config.yaml $(CONFIG)
 
 test: .venv/ready
 	$(BIN)/python -m pytest

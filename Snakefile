@@ -2,7 +2,8 @@ from pathlib import Path
 
 from snakemake.utils import min_version, validate
 
-from rrru.studies.checks import check_keys, check_once, check_schema
+from rrru.pipeline.checks import check_keys, check_once, check_schema
+from rrru.pipeline.read_config import SCHEMA
 
 min_version("9.0")
 # the last digits of sums depend on how many threads of linear algebra share them: one, whatever `threads` a rule has
@@ -13,9 +14,9 @@ configfile: "config.yaml"
 
 
 check_keys(workflow.configfiles)
-check_schema(config, Path(workflow.basedir, "workflow/schemas/config.schema.yaml"))
+check_schema(config, SCHEMA)
 # it sets what is absent to the defaults
-validate(config, "workflow/schemas/config.schema.yaml")
+validate(config, str(SCHEMA))
 
 
 include: "workflow/rules/pipeline/common.smk"

@@ -18,7 +18,7 @@ from benchmarks import harness
 from benchmarks.harness import RESULTS, Task
 from rrru.diagnosis.diagnose import MeasuredRobot, diagnose
 from rrru.diagnosis.settings import GapSettings
-from rrru.studies import config as parts
+from rrru.pipeline import config as parts
 from rrru.studies.blind_validation.chunks import Member
 from rrru.studies.blind_validation.draw import draw
 from rrru.studies.blind_validation.robots import Conditions

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
+from rrru.pipeline import setup
 from rrru.simulation import mujoco_model
 from rrru.simulation.mujoco_robot import MujocoRobot
 from rrru.simulation.mujoco_run import Machine
-from rrru.studies import setup
 
 ROOT = Path(__file__).resolve().parents[1]
 FILE, PLATFORM, NOISE_MM = ROOT / "data/models/arm6.xml", "tool0", 0.01

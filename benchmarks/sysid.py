@@ -44,9 +44,9 @@ from rrru.diagnosis.correction.corrected_model import write_corrected
 from rrru.diagnosis.diagnose import MeasuredRobot, diagnose
 from rrru.diagnosis.settings import GapSettings
 from rrru.kinematics.dynamics import Masses
+from rrru.pipeline import setup
 from rrru.simulation import mujoco_causes, mujoco_model
 from rrru.store import tables
-from rrru.studies import setup
 from rrru.studies.end_to_end.models import errors
 
 # seeds from 0 on; the first few are also fitted in the other structure

@@ -9,6 +9,7 @@ from tests.places import ROOT
 
 _ROOT = ROOT
 _FLOORS = {
+    "__version__": 0,
     "errors": 1,
     "seeds": 1,
     "cache": 1,
@@ -25,8 +26,11 @@ _FLOORS = {
     "genetic": 9,
     "compensation": 9,
     "diagnosis": 9,
-    "studies": 10,
-    "report": 11,
+    "pipeline": 10,
+    "studies": 11,
+    "report": 12,
+    "api": 13,
+    "cli": 14,
 }
 # tables in, figures out: they import none of the computing packages
 _APART = {"store": {"errors"}, "figures": {"errors", "store"}}

@@ -1,6 +1,6 @@
 """The diagnosis of one campaign: variance by factor, causes, explained fraction and what to measure next."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -52,6 +52,7 @@ from rrru.robots.drive_words import drive_words
 from rrru.seeds import stream
 
 _DEFAULTS = GapSettings()
+STEPS = ("problem", "posterior of the causes", "shrinkage and budget", "next runs", "tables")
 
 
 @dataclass(frozen=True)
@@ -92,13 +93,20 @@ def with_wide_bounds(mechanism: Any) -> Any:
 
 
 def diagnose(
-    measurements: pd.DataFrame, robot: MeasuredRobot, settings: GapSettings = _DEFAULTS, details: bool = True
+    measurements: pd.DataFrame,
+    robot: MeasuredRobot,
+    settings: GapSettings = _DEFAULTS,
+    details: bool = True,
+    progress: Callable[[str], None] | None = None,
 ) -> Diagnosis:
     """Diagnosis of a measurement table of a MeasuredRobot.
 
-    details: also the tables beyond the verdict, its budget and parameters and what to measure next. Raises FitError
-    where the readings do not determine the calibration with some to spare, see `rrru.diagnosis.determined`.
+    details: also the tables beyond the verdict, its budget and parameters and what to measure next. progress: called
+    with each of STEPS as it begins. Raises FitError where the readings do not determine the calibration with some to
+    spare, see `rrru.diagnosis.determined`.
     """
+    begin = progress or (lambda _: None)
+    begin(STEPS[0])
     library = settings.library(robot.mechanism)
     stated = (KNOWN if robot.noise_known else STATED) if robot.noise_mm else UNKNOWN_NOISE
     nominal, near = with_wide_bounds(robot.mechanism), settings.use_near_singularity
@@ -110,16 +118,20 @@ def diagnose(
         case = with_arm(case, robot.noise_mm, robot.noise_rad)
     case = with_world_scale(case)
     generator = stream(settings.seed, "gap", robot.campaign)
+    begin(STEPS[1])
     verdict, inference, ordered = _decide(infer(case, settings.prior, stated), settings.prior)
     if why := why_no_answer(inference, robot.noise_mm):
         verdict, inference, ordered = without_answer(why), _without_effects(inference, settings.prior), ()
+    begin(STEPS[2])
     steps = shrink_steps(inference, [term for term, _ in ordered], generator, settings.draws)
     case = inference.case
     residual = case.residual(inference.calibrated)
     budget_generator = stream(settings.seed, "gap budget", robot.campaign)
     parts = budget(inference, robot.noise_mm or None, budget_generator, settings.draws)
     sizes = parts[parts["kind"] == "effect"].set_index("part")["rms_mm"].to_dict()
+    begin(STEPS[3])
     further = advise(inference, verdict, robot.masses, robot.limits, sizes)
+    begin(STEPS[4])
     worst = worst_spot(case.motion.position_mm[case.at][case.on_robot], residual[case.on_robot])
     excluded = left_out(case, near)
     row = _row(inference, verdict, steps, worst, further, (robot.noise_mm, excluded))

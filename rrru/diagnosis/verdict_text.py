@@ -1,6 +1,6 @@
 """The answer of a diagnosis for people and for scripts: sentences in plain words, and the same facts as `verdict.json`.
 
-`workflow/schemas/verdict.schema.yaml` is its schema. mm, rad; sizes are root mean squares of 3-D distances.
+`rrru/pipeline/verdict.schema.yaml` is its schema. mm, rad; sizes are root mean squares of 3-D distances.
 """
 
 import numpy as np

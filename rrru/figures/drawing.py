@@ -14,8 +14,17 @@ def draw_all(figures, paths, options, outputs):
     is its caption in all files.
     """
     for name, (place, needed) in figures.items():
-        module, _, infer = place.partition(":")
-        function = getattr(importlib.import_module(module), infer)
-        figure = function({table: tables.read(paths[table]) for table in needed}, options)
+        figure = draw(place, {table: tables.read(paths[table]) for table in needed}, options)
         files = {kind: outputs[f"{name}_{kind}"] for kind in style.KINDS}
-        style.save(figure, files, inspect.cleandoc(function.__doc__))
+        style.save(figure, files, inspect.cleandoc(_function(place).__doc__))
+
+
+def draw(place, frames, options):
+    """The figure of a function "module:function" for frames by table name."""
+    return _function(place)(frames, options)
+
+
+def _function(place):
+    """The function that "module:function" names."""
+    module, _, name = place.partition(":")
+    return getattr(importlib.import_module(module), name)

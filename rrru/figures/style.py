@@ -189,7 +189,9 @@ def save(figure, paths, caption=""):
 def arrange(figure):
     """Give the panels their places once, so that all files of a figure, and every later one, have them there."""
     if engine := figure.get_layout_engine():
-        engine.execute(figure)
+        # of a line of text alone it would warn that there is nothing to arrange
+        if figure.axes:
+            engine.execute(figure)
         figure.set_layout_engine(None)
         # its solver's last digits differ from the first figure of a process to the next
         for axes in figure.axes:

@@ -1,16 +1,15 @@
-"""One page on which of two calibrations to trust: `python -m rrru.report.compare_page A B page.html`.
+"""One page on which of two calibrations to trust: `rrru compare A B`.
 
 A and B are folders of results, campaigns of `results`, or `folder:campaign`.
 """
 
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 
 import pandas as pd
 
 from rrru.diagnosis.verdict_text import probability, readable, rounded
-from rrru.errors import ConfigError, RrruError
+from rrru.errors import ConfigError
 from rrru.report import cells, compare, page
 from rrru.report.compare_gap import gap_difference
 from rrru.report.compare_unseen import same_points, unseen
@@ -175,18 +174,3 @@ def _heads(frame, names):
 def _chance(value):
     """A probability by chance."""
     return "less than 0.001" if value < 0.001 else f"{value:.3f}" if value < 0.1 else f"{value:.2f}"
-
-
-def main(arguments):
-    """The command: A, B and the page to write; an error ends it with a message."""
-    if len(arguments) != 3 or not all(arguments):
-        sys.exit("usage: make compare A=.. B=..: two folders of results, or two campaigns of results")
-    try:
-        write(*arguments)
-    except RrruError as error:
-        sys.exit(f"{type(error).__name__}: {error}")
-    print(arguments[2])
-
-
-if __name__ == "__main__":
-    main(sys.argv[1:])

@@ -11,8 +11,8 @@ from rrru.calibration.campaign_fit import deviation_vector, select
 from rrru.campaign import measurements as rows
 from rrru.compensation.evaluate import model_residual
 from rrru.errors import FitError
+from rrru.pipeline import setup
 from rrru.report.compare import METHOD
-from rrru.studies import setup
 
 # with fewer trajectories or runs than this a campaign is cut into as many stretches
 _FOLDS = 4

@@ -10,9 +10,13 @@ from rrru.store.atomic_write import write_text
 
 
 def write(facts: dict[str, Any], path: str | Path) -> None:
-    """Write facts as JSON, completely or not at all; numbers of NumPy as plain ones, non-finite ones as null."""
-    text = json.dumps(_plain(facts), indent=1, sort_keys=True, allow_nan=False, ensure_ascii=False)
-    write_text(f"{text}\n", path)
+    """Write facts as JSON, completely or not at all."""
+    write_text(text(facts), path)
+
+
+def text(facts: dict[str, Any]) -> str:
+    """Facts as JSON; numbers of NumPy as plain ones, non-finite ones as null."""
+    return json.dumps(_plain(facts), indent=1, sort_keys=True, allow_nan=False, ensure_ascii=False) + "\n"
 
 
 def read(path: str | Path) -> dict[str, Any]:

@@ -15,9 +15,9 @@ _HEAD = """# What a run writes
 `verdict.json`, and what it was calibrated as, `robot.json`; `figures/` every figure as PDF, PNG and SVG, `timings/`
 wall times (the only files whose bytes differ from run to run), `logs/` one log per job, `sweep/` the parts of the
 sweeps. Lengths are in mm and angles in rad unless a column's name says otherwise. This page is made from the
-`schemas.py` of each package and from `workflow/schemas/verdict.schema.yaml`.
+`schemas.py` of each package and from `rrru/pipeline/verdict.schema.yaml`.
 """
-_ROOT = Path(__file__).resolve().parents[2]
+_VERDICT = Path(rrru.__file__).parent / "pipeline" / "verdict.schema.yaml"
 
 
 def tables():
@@ -40,9 +40,9 @@ def text():
 
 def _answer():
     """The keys of verdict.json, from its schema."""
-    schema = yaml.safe_load((_ROOT / "workflow/schemas/verdict.schema.yaml").read_text())
+    schema = yaml.safe_load(_VERDICT.read_text())
     rows = [f"| `{name}` | {_keys(key)} | {key['description']} |" for name, key in schema["properties"].items()]
-    heading = f"## verdict.json\n\n{schema['description']}. Schema: `workflow/schemas/verdict.schema.yaml`.\n"
+    heading = f"## verdict.json\n\n{schema['description']}. Schema: `rrru/pipeline/verdict.schema.yaml`.\n"
     return "\n".join([heading, "| key | type | meaning |", "| --- | --- | --- |", *rows, ""])
 
 
@@ -62,4 +62,4 @@ def _row(column):
 
 
 if __name__ == "__main__":
-    (_ROOT / "results" / "README.md").write_text(text())
+    Path(rrru.__file__).parents[1].joinpath("results", "README.md").write_text(text())

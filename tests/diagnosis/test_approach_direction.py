@@ -23,7 +23,7 @@ from rrru.effects.library import find
 from rrru.effects.protocol import together
 from rrru.errors import FitError
 from rrru.kinematics.inverse import inverse_kinematics
-from rrru.studies.setup import as_measured
+from rrru.pipeline.setup import as_measured
 from tests.diagnosis import arms
 from tests.diagnosis.campaigns import ROBOT, active, case_of, measure, plan_of, robot_of, strong
 

@@ -13,8 +13,8 @@ from rrru.campaign.ingest.spec import IngestSpec
 from rrru.diagnosis.diagnose import MeasuredRobot, diagnose
 from rrru.diagnosis.settings import GapSettings
 from rrru.effects.library import NAMES
+from rrru.pipeline.setup import as_measured
 from rrru.robots.hexapod import hexapod
-from rrru.studies.setup import as_measured
 from tests.diagnosis import hexapod_stops
 
 _NOISE_MM, _NOISE_RAD, _LEAD_ERROR = 0.015, 4e-5, 1.5e-3

@@ -7,8 +7,8 @@ from rrru.diagnosis.diagnose import MeasuredRobot, diagnose
 from rrru.diagnosis.settings import GapSettings
 from rrru.effects.library import find
 from rrru.kinematics.dynamics import Masses
+from rrru.pipeline import setup
 from rrru.robots.catalogue import make_mechanism
-from rrru.studies import setup
 
 _SCARA = {
     "dh": [

@@ -19,9 +19,9 @@ from rrru.diagnosis.stop_paths import paths_between_stops, undetermined_senses
 from rrru.effects.library import find
 from rrru.errors import ConfigError
 from rrru.kinematics.dynamics import Masses
+from rrru.pipeline.setup import as_measured
 from rrru.robots.hexapod import hexapod
 from rrru.store import tables
-from rrru.studies.setup import as_measured
 from tests.diagnosis import arms, hexapod_stops
 from tests.schemas import check_measurements
 

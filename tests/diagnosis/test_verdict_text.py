@@ -23,7 +23,7 @@ from tests.figures import synthetic_tables as synthetic
 from tests.places import ROOT
 
 CAMPAIGN = synthetic.CAMPAIGN
-SCHEMA = yaml.safe_load((ROOT / "workflow/schemas/verdict.schema.yaml").read_text())
+SCHEMA = yaml.safe_load((ROOT / "rrru/pipeline/verdict.schema.yaml").read_text())
 
 _LEGS = DriveWords()
 

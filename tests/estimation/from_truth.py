@@ -19,7 +19,7 @@ from rrru.diagnosis.state import State
 from rrru.errors import FitError
 from rrru.kinematics.base_parameters import open_numbers
 from rrru.kinematics.dynamics import Masses
-from rrru.studies import setup
+from rrru.pipeline import setup
 from rrru.studies.real.frame_fit import FRAMES, FrameObservations, fit_frames, frame_directions, frames
 from tests.estimation.random_robots import NOISE_MM, draw_campaign
 

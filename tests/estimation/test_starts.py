@@ -13,7 +13,7 @@ from rrru.estimation.parameters import Block, Parameters
 from rrru.estimation.problem import Problem
 from rrru.estimation.solver import SolverOptions, solve
 from rrru.estimation.starts import register_measurements
-from rrru.studies import setup
+from rrru.pipeline import setup
 from tests.estimation.from_truth import case_of, outcome_of, squares, unregistered_table
 from tests.estimation.random_robots import KINDS, NOISE_MM, draw_campaign
 

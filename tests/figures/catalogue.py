@@ -1,16 +1,17 @@
-"""Every figure as the workflow draws it: name to function and tables, out of the rules' files."""
+"""Every figure as the workflow draws it: name to function and tables, out of the package and the rules' files."""
 
 import importlib
 import re
 
+from rrru.pipeline.jobs.outputs import CAMPAIGN_FIGURES, GAP_FIGURES
 from tests.places import ROOT
 
 _ASSIGNED = re.compile(r"^(_?[A-Z_]+ = (?:\{.*?\}|\{\n.*?^\}|\[.*?\]|\"[^\n]*\"))$", re.MULTILINE | re.DOTALL)
 
 
 def _figures():
-    """Figures {name: ("module:function", tables)} of all rules."""
-    result = {}
+    """Figures {name: ("module:function", tables)} of the jobs of a campaign and of all rules."""
+    result = {**CAMPAIGN_FIGURES, **GAP_FIGURES}
     for file in sorted((ROOT / "workflow/rules").rglob("*.smk")):
         names = {}
         for statement in _ASSIGNED.findall(file.read_text()):

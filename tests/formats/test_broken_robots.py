@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 
 from rrru.errors import ConfigError
 from rrru.formats.robot_file import from_mjcf, from_urdf
+from rrru.pipeline.checks import check_schema
 from rrru.robots.catalogue import make_mechanism
-from rrru.studies.checks import check_schema
 from tests.broken import COUNT, EDITS, SPLICES, counted, edited, edited_xml, many, spliced
 from tests.places import DATA, ROOT
 
@@ -62,7 +62,7 @@ def test_a_broken_file_of_a_robot_is_taken_or_refused(name, tmp_path):
 
 @pytest.mark.parametrize("section", [ARM, HANDS], ids=["arm", "hands"])
 def test_broken_rows_are_taken_or_refused(section, tmp_path):
-    schema, counts = yaml.safe_load((ROOT / "workflow/schemas/config.schema.yaml").read_text()), Counter()
+    schema, counts = yaml.safe_load((ROOT / "rrru/pipeline/config.schema.yaml").read_text()), Counter()
     robots = schema["properties"]["robots"] | {"$defs": schema["$defs"], "required": []}
     (tmp_path / "schema.yaml").write_text(yaml.safe_dump(robots))
 

@@ -221,10 +221,10 @@ def test_the_schema_of_the_configuration_knows_hands():
     config = yaml.safe_load((ROOT / "config.yaml").read_text())
     tips = {"urdf": "two_arms.urdf", "tips": {"right": "r", "left": "l"}}
     config["robots"] |= {"mine": two_arms.section(carries={"right": ["r1"]}), "tree": tips}
-    validate(config, str(ROOT / "workflow/schemas/config.schema.yaml"))
+    validate(config, str(ROOT / "rrru/pipeline/config.schema.yaml"))
     config["robots"]["mine"]["hands"]["left"][1]["nothing"] = 1.0
     with pytest.raises(Exception, match="nothing"):
-        validate(config, str(ROOT / "workflow/schemas/config.schema.yaml"))
+        validate(config, str(ROOT / "rrru/pipeline/config.schema.yaml"))
 
 
 def _without(section, key):

@@ -5,6 +5,7 @@ import pandas as pd
 import pytest
 from scipy.stats import chi2, kstest
 
+from rrru import cli
 from rrru.errors import ConfigError
 from rrru.report import compare, compare_page
 from rrru.report.compare_gap import gap_difference
@@ -187,9 +188,8 @@ def test_what_cannot_be_compared_is_refused_in_words(folder, others, tmp_path, f
 
 
 def test_the_command_ends_with_a_message(folder, tmp_path, capsys):
-    with pytest.raises(SystemExit, match="ConfigError: compare: A and B are both"):
-        compare_page.main([f"{folder}:a", f"{folder}:a", str(tmp_path / "page.html")])
-    with pytest.raises(SystemExit, match="usage: make compare"):
-        compare_page.main(["", "", "page.html"])
-    compare_page.main([f"{folder}:a", f"{folder}:b", str(tmp_path / "page.html")])
-    assert capsys.readouterr().out.strip() == str(tmp_path / "page.html")
+    page = ["--page", str(tmp_path / "page.html")]
+    assert cli.main(["compare", f"{folder}:a", f"{folder}:a", *page]) == cli.WRONG
+    assert "error: compare: A and B are both" in capsys.readouterr().err
+    assert cli.main(["compare", f"{folder}:a", f"{folder}:b", *page]) == cli.DONE
+    assert capsys.readouterr().out.strip() == f"page: {tmp_path / 'page.html'}"

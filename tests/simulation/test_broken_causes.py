@@ -10,8 +10,8 @@ import yaml
 from hypothesis import given
 
 from rrru.errors import ConfigError
+from rrru.pipeline.checks import check_schema
 from rrru.simulation import mujoco_robot
-from rrru.studies.checks import check_schema
 from tests.broken import COUNT, EDITS, counted, edited, many
 from tests.places import ROOT
 from tests.simulation.simulated import MODELS, file_of, mechanism
@@ -39,7 +39,7 @@ CAUSES = {
 
 @pytest.mark.parametrize("name", CAUSES)
 def test_broken_causes_are_taken_or_refused(name, tmp_path):
-    schema, counts = yaml.safe_load((ROOT / "workflow/schemas/config.schema.yaml").read_text()), Counter()
+    schema, counts = yaml.safe_load((ROOT / "rrru/pipeline/config.schema.yaml").read_text()), Counter()
     own = schema["properties"]["virtual_robots"] | {"$defs": schema["$defs"]}
     (tmp_path / "schema.yaml").write_text(yaml.safe_dump(own))
     base, given_as = {"real": {"mujoco": {"causes": CAUSES[name]}}}, {"mjcf": file_of(name), "platform": MODELS[name]}

@@ -7,13 +7,13 @@ import pytest
 from rrru.campaign.stops import stops
 from rrru.errors import ConfigError, SimulationError, UnreachableError
 from rrru.formats.robot_file import from_urdf
+from rrru.pipeline import config as parts
+from rrru.pipeline import setup
 from rrru.robots.delta import Delta
 from rrru.robots.rrru3 import Rrru3
 from rrru.simulation import mujoco_model, mujoco_run
 from rrru.simulation.mujoco_robot import MujocoRobot
 from rrru.simulation.tracker import Sees
-from rrru.studies import config as parts
-from rrru.studies import setup
 from tests.simulation.simulated import MODELS, file_of, mechanism, near_home, on_line, simulated, standing
 
 _AWAY = ((0.0, 0.0, 0.0), (60.0, 30.0, 20.0), (-50.0, 40.0, -30.0), (10.0, -60.0, 25.0))

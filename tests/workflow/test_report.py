@@ -133,7 +133,7 @@ def test_the_page_is_small_and_its_bytes_follow_from_the_results(written, result
 
 
 def test_every_answer_fits_its_schema_and_says_what_the_tables_say(results):
-    schema = yaml.safe_load((ROOT / "workflow/schemas/verdict.schema.yaml").read_text())
+    schema = yaml.safe_load((ROOT / "rrru/pipeline/verdict.schema.yaml").read_text())
     jsonschema.Draft202012Validator.check_schema(schema)
     verdicts = pd.read_parquet(results / "tables/gap_verdicts.parquet").set_index("campaign")
     files = sorted(results.glob("campaigns/*/verdict.json"))

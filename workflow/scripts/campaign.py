@@ -1,54 +1,7 @@
-"""One campaign: driven by a virtual robot or read from a file."""
+"""One campaign, driven by a virtual robot or read from a file."""
 
-import pandas as pd
-
-from rrru.calibration.campaign_noise import campaign_noise
-from rrru.campaign.schemas import TABLES, measurement_table
-from rrru.store import tables
-from rrru.store.job import run, tell
-from rrru.studies import campaigns, setup
-
-
-def main(settings, inputs, outputs):
-    """Write measurements, truth (empty for a file), singularity measures, workspace slices and the campaign's row."""
-    name, section, nominal = settings["campaign"], settings["section"], settings["nominal"]
-    robot = setup.mechanism(nominal)
-    if settings["virtual"]:
-        advice = [tables.read(inputs[key]) for key in ("next_runs", "next_poses") if inputs.get(key)]
-        measurements, truth = setup.virtual_campaign(nominal, settings["virtual"], advice or None).run()
-        notes, registration = campaigns.unadvised(advice), None
-    else:
-        # a large import that virtual campaigns do not need
-        from rrru.campaign.ingest.campaign_file import ingest
-        from rrru.campaign.ingest.spec import IngestSpec
-
-        ingested = ingest(IngestSpec.from_config(section), robot)
-        measurements, truth = ingested.measurements, pd.DataFrame(columns=_columns("truth"))
-        notes, registration = ingested.notes, ingested.registration
-    measurements, singular = campaigns.with_singularities(robot, measurements, settings["singularity_margin"])
-    given = section.get("noise_mm"), section.get("noise_rad")
-    known = setup.measured_robot(nominal, measurements)
-    noise = campaign_noise(known, measurements, given, settings["use_near_singularity"])
-    notes = (*notes, *campaigns.unmatched_sets(settings["sets"], measurements))
-    row = campaigns.campaign_row(robot, section, measurements, singular, noise, notes, registration)
-    if row["notes"]:
-        tell(f"campaign {name}: {row['notes']}")
-    frames = {
-        "truth": truth[_columns("truth")],
-        "singularity": singular.assign(campaign=name),
-        "workspace": campaigns.workspace_table(robot, measurements).assign(campaign=name),
-        "campaigns": pd.DataFrame([row]).assign(campaign=name),
-        "registration": campaigns.registration_table(registration).assign(campaign=name),
-    }
-    table = measurement_table(robot, measurements.columns)
-    tables.write_all((table,), {"measurements": measurements}, outputs)
-    tables.write_all(TABLES, frames, outputs)
-
-
-def _columns(name):
-    """The columns of a campaign's table."""
-    return next(table.names for table in TABLES if table.name == name)
-
+from rrru.pipeline.jobs.read import main
+from rrru.store.job import run
 
 if __name__ == "__main__":
     run(main, snakemake)

@@ -2,9 +2,9 @@
 
 from rrru.calibration.campaign_fit import deviation_vector
 from rrru.kinematics.dynamics import Masses
+from rrru.pipeline import setup
 from rrru.store import tables
 from rrru.store.job import run
-from rrru.studies import setup
 from rrru.studies.end_to_end.models import errors, sizes
 from rrru.studies.end_to_end.schemas import TABLES
 

@@ -1,8 +1,8 @@
 """Results of the reproduced robot for other draws of non-repeatability and noise, and the searched numbers."""
 
+from rrru.pipeline import setup
 from rrru.store import tables
 from rrru.store.job import run
-from rrru.studies import setup
 from rrru.studies.rrru3 import twin
 from rrru.studies.rrru3.redraw import redraw_counts, redraws
 from rrru.studies.rrru3.schemas import TABLES

@@ -8,9 +8,9 @@ from rrru.errors import ConfigError
 from rrru.genetic.schemas import TABLES
 from rrru.genetic.settings import GeneticSettings
 from rrru.genetic.sweep import run_sweep
+from rrru.pipeline import setup
 from rrru.store import tables
 from rrru.store.job import run
-from rrru.studies import setup
 
 
 def main(settings, inputs, outputs):

@@ -2,9 +2,9 @@
 
 import logging
 
+from rrru.pipeline import setup
 from rrru.store import overlay
 from rrru.store.job import run
-from rrru.studies import setup
 from rrru.studies.rrru3 import twin, twin_search
 
 

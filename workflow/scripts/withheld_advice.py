@@ -5,9 +5,9 @@ import pandas as pd
 from rrru.diagnosis.diagnose import MeasuredRobot
 from rrru.diagnosis.settings import GapSettings
 from rrru.kinematics.dynamics import Masses
+from rrru.pipeline import setup
 from rrru.store import tables
 from rrru.store.job import run
-from rrru.studies import setup
 from rrru.studies.blind_validation.advice import UNSURE, advice_summary, ambiguous, follow
 from rrru.studies.blind_validation.members import robot_of
 from rrru.studies.blind_validation.robots import Conditions

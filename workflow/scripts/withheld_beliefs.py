@@ -5,9 +5,9 @@ import pandas as pd
 from rrru.diagnosis.diagnose import MeasuredRobot
 from rrru.diagnosis.settings import GapSettings
 from rrru.kinematics.dynamics import Masses
+from rrru.pipeline import setup
 from rrru.store import tables
 from rrru.store.job import run
-from rrru.studies import setup
 from rrru.studies.blind_validation.beliefs import beliefs
 from rrru.studies.blind_validation.schemas import TABLES
 

@@ -6,9 +6,9 @@ from rrru.diagnosis.diagnose import MeasuredRobot, diagnose
 from rrru.diagnosis.result_tables import parameter_rows
 from rrru.diagnosis.settings import GapSettings
 from rrru.kinematics.dynamics import Masses
+from rrru.pipeline import setup
 from rrru.store import tables
 from rrru.store.job import run
-from rrru.studies import setup
 from rrru.studies.blind_validation.numbers import fitted
 from rrru.studies.blind_validation.schemas import TABLES
 from rrru.studies.blind_validation.stated import stated

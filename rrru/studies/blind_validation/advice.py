@@ -11,8 +11,8 @@ import pandas as pd
 from rrru.campaign.plan import Plan
 from rrru.diagnosis.design.advise import candidates
 from rrru.diagnosis.diagnose import Diagnosis, diagnose
+from rrru.pipeline.advised import advised_runs
 from rrru.seeds import stream
-from rrru.studies.advised import advised_runs
 from rrru.studies.blind_validation.noise import NoiseModel, with_noise
 from rrru.studies.blind_validation.summary import wilson
 from rrru.studies.blind_validation.verdicts import is_right

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rrru.errors import ConfigError
-from rrru.studies import config as parts
+from rrru.pipeline import config as parts
 from rrru.studies.blind_validation.models import MODELS
 from rrru.studies.blind_validation.noise import NOISES
 from rrru.studies.blind_validation.verdicts import AS_ROBOTS_ARE, PLANTS

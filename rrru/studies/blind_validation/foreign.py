@@ -16,10 +16,10 @@ from rrru.campaign.plan import make_plan
 from rrru.campaign.trajectories import from_config
 from rrru.errors import SimulationError, UnreachableError
 from rrru.kinematics.dynamics import Masses
+from rrru.pipeline import setup
 from rrru.seeds import stream
 from rrru.simulation.driven import SETTLE_S
 from rrru.simulation.tracker import Sees
-from rrru.studies import setup
 from rrru.studies.blind_validation.box import draw_trajectories
 from rrru.studies.blind_validation.faults import Fault, draw_fault, kind_of, kinds_of
 from rrru.studies.blind_validation.models import MODELS

@@ -12,9 +12,9 @@ from rrru.campaign.trajectories import from_config
 from rrru.effects.protocol import ActiveEffect
 from rrru.errors import FitError
 from rrru.kinematics.dynamics import Masses
+from rrru.pipeline import setup
 from rrru.seeds import stream
 from rrru.simulation.virtual_robot import VirtualRobot
-from rrru.studies import setup
 from rrru.studies.blind_validation.noise import NoiseModel, with_noise
 from rrru.studies.blind_validation.outside import CAUSES, OUTSIDE
 from rrru.studies.blind_validation.verdicts import PREFIX

@@ -25,6 +25,6 @@ def settings(config, name):
         },
         "real": config["loads"] | real(),
         "region": section["regions"][name],
-        "genetic": {key: value for key, value in config["genetic"].items() if key != "seeds"},
+        "genetic": {key: value for key, value in config["genetic"].items() if key not in ("campaigns", "seeds")},
         **{key: section[key] for key in _SHARED},
     }

@@ -6,9 +6,9 @@ import numpy as np
 
 from rrru.campaign.stops import cylinder_points, nearest_first, stops
 from rrru.errors import ConfigError
+from rrru.pipeline import setup
 from rrru.seeds import stream
 from rrru.simulation.driven import DrivenRobot
-from rrru.studies import setup
 
 TESTS = ("inside", "outside")
 

@@ -4,19 +4,16 @@ import argparse
 import sys
 from pathlib import Path
 
-import yaml
 from jinja2 import Environment
 
-import rrru
-from rrru.errors import ConfigError, FitError, RrruError
+from rrru.errors import FitError, RrruError, WriteError
+from rrru.pipeline.read_config import DEFAULTS, read_config
 from rrru.studies.printers.answers import answer, failed
 from rrru.studies.printers.files import read_all
 from rrru.studies.printers.judge import judge
 from rrru.studies.printers.printer import Refused
 from rrru.studies.printers.printer_tables import level_of
 
-# the project's, wherever the command is run
-_CONFIG = Path(rrru.__file__).parents[1] / "config.yaml"
 _PAGE = """<!DOCTYPE html>
 <html lang="en"><meta charset="utf-8"><meta name="viewport" content="width=device-width">
 <title>Delta printers</title>
@@ -37,15 +34,27 @@ def main(arguments=None):
     """Answer for the printers of the files on the command line; ends with 2 where a printer gives no answer."""
     options = _parser().parse_args(arguments)
     try:
-        answers = answers_of(options.files)
+        complete = answer_files(options.files, options.page)
+    except RrruError as error:
+        sys.exit(f"{type(error).__name__}: {error}")
+    if not complete:
+        sys.exit(2)
+
+
+def answer_files(files, page=None):
+    """Print the Answer for the printers of files, and write it to a page; returns whether every printer has one.
+
+    Raises IngestError where none of the files can be read, and WriteError where the page cannot be written.
+    """
+    try:
+        answers = answers_of(files)
     except RrruError as error:
         # replaces the page of an earlier run
-        _write(options.page, [failed("no answer", str(error))])
-        sys.exit(f"{type(error).__name__}: {error}")
-    _write(options.page, answers)
+        _write(page, [failed("no answer", str(error))])
+        raise
+    _write(page, answers)
     print("\n\n".join(_text(one) for one in answers))
-    if any(not one.settings for one in answers):
-        sys.exit(2)
+    return all(one.settings for one in answers)
 
 
 def _write(path, answers):
@@ -55,7 +64,8 @@ def _write(path, answers):
         try:
             Path(path).write_text(page, encoding="utf-8")
         except OSError as error:
-            sys.exit(f"{path}: cannot be written ({error.strerror}); allowed: a file in a writable folder")
+            allowed = "a file in a folder that may be written to"
+            raise WriteError(f"{path}: cannot be written ({error.strerror}); allowed: {allowed}") from error
 
 
 def _parser():
@@ -63,7 +73,7 @@ def _parser():
     parser = argparse.ArgumentParser(
         prog="rrru-printer",
         description="Check the calibration of delta printers.",
-        epilog=f"Run it in any folder. Its settings are the section printers of {_CONFIG}",
+        epilog=f"The same as `rrru printer`, in any folder. Its settings are the section printers of {DEFAULTS}",
     )
     files_help = "Klipper's printer.cfg, or JSON as in docs/printers.md"
     parser.add_argument("files", nargs="+", metavar="FILE", help=files_help)
@@ -72,15 +82,8 @@ def _parser():
 
 
 def answers_of(paths):
-    """The Answer for every printer of the files.
-
-    Raises IngestError where none of them can be read, and ConfigError where the project's settings are missing.
-    """
-    try:
-        settings = yaml.safe_load(_CONFIG.read_text(encoding="utf-8"))["printers"]
-    except OSError as error:
-        allowed = "rrru installed with pip install -e from its project's folder, which has the settings"
-        raise ConfigError(f"{_CONFIG}: cannot be read ({error.strerror}); allowed: {allowed}") from error
+    """The Answer for every printer of the files; raises IngestError where none of them can be read."""
+    settings = read_config()["printers"]
     printers = read_all(paths)
     level = level_of([printer for printer in printers if not isinstance(printer, Refused)], settings)
     return [_answer(printer, settings["stopping_step"], level) for printer in printers]

@@ -9,9 +9,9 @@ from rrru.campaign import measurements as rows
 from rrru.campaign.measurements import vector_columns
 from rrru.compensation.backlash import measured_width, repeatability
 from rrru.kinematics import workspace
+from rrru.pipeline import setup
 from rrru.seeds import stream
 from rrru.simulation.screw import ScrewBench, encoder_record
-from rrru.studies import setup
 from rrru.studies.ptt3.experiments import experiment, nominal
 
 _LEGS = (1, 2, 3)

@@ -14,7 +14,7 @@ from rrru.campaign import measurements as rows
 from rrru.campaign.plan import make_plan
 from rrru.campaign.trajectories import from_config
 from rrru.compensation.backlash import compensated
-from rrru.studies import setup
+from rrru.pipeline import setup
 from rrru.studies.ptt3.parts import campaign_section
 
 
@@ -91,7 +91,7 @@ class Experiment:
 
 
 def nominal(settings):
-    """The robot section for the builder, see `rrru.studies.config`."""
+    """The robot section for the builder, see `rrru.pipeline.config`."""
     return {"name": "ptt3", "dimensions": settings["robots"]["ptt3"]}
 
 

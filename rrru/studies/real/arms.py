@@ -25,7 +25,7 @@ from rrru.diagnosis.state import State
 from rrru.errors import ConfigError, FitError, IngestError
 from rrru.kinematics.dynamics import Masses
 from rrru.kinematics.robot import Robot
-from rrru.studies import setup
+from rrru.pipeline import setup
 from rrru.studies.real import chains
 from rrru.studies.real.series import Series
 from rrru.studies.real.sheets import HELD_OUT, in_file, in_series_terms, joint_columns, sheet, stated_noise
@@ -139,7 +139,7 @@ def studied(known: Prepared, settings: GapSettings) -> Studied:
 
 
 def nominal_robot(series: Series, robots: Mapping[str, Any]) -> dict:
-    """The nominal robot of a series for `rrru.studies.setup`: an entry of `robots:`, or a chain's file."""
+    """The nominal robot of a series for `rrru.pipeline.setup`: an entry of `robots:`, or a chain's file."""
     section = series.section
     if "chain" in section:
         name, dimensions = series.dataset, _chain(series)

@@ -22,7 +22,7 @@ from rrru.diagnosis.state import State
 from rrru.effects.protocol import Effect, plain_coordinates
 from rrru.errors import FitError
 from rrru.kinematics.robot import Robot
-from rrru.studies import setup
+from rrru.pipeline import setup
 from rrru.studies.real.arms import NO_MASSES, Studied, nominal_robot
 from rrru.studies.real.frame_fit import FRAMES, fit_frames, frames
 from rrru.studies.real.series import Series

@@ -9,7 +9,7 @@ from typing import Any
 import pandas as pd
 
 from rrru.errors import ConfigError
-from rrru.studies.config import own_robot_file
+from rrru.pipeline.config import own_robot_file
 
 # names the folder of data that may not be redistributed
 VARIABLE = "RRRU_REAL_DATA"

@@ -6,8 +6,9 @@ import pandas as pd
 
 from rrru.campaign.measurements import vectors
 from rrru.genetic.campaign_runs import typical_parameters
+from rrru.pipeline import setup
 from rrru.robots.rrru3 import Rrru3
-from rrru.studies import paper, setup
+from rrru.studies import paper
 from rrru.studies.rrru3 import study_numbers as computed
 from rrru.studies.rrru3.paper import NUMBERS, SETTINGS, TIED, TIED_TO_PRINTED
 

@@ -24,9 +24,9 @@ from rrru.effects.library import active_effects
 from rrru.effects.protocol import together
 from rrru.formats.robot_file import from_mjcf
 from rrru.kinematics.dynamics import Masses
+from rrru.pipeline import setup
 from rrru.robots.catalogue import make_mechanism
 from rrru.store import tables
-from rrru.studies import setup
 from tests.formats.mjcf import ARM, HEXAPOD, file_of, text_of
 
 _MASSES, _NOISE_MM, _NOISE_RAD = Masses(0.0, 0.0, 0.0), 0.005, 2e-5

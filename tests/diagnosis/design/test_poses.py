@@ -25,8 +25,8 @@ from rrru.effects.library import find
 from rrru.effects.protocol import Coordinates
 from rrru.errors import FitError
 from rrru.parameters import ParameterSet
+from rrru.pipeline.setup import as_measured
 from rrru.robots.hexapod import hexapod
-from rrru.studies.setup import as_measured
 from tests.diagnosis import arms, hexapod_stops
 from tests.diagnosis.campaigns import EFFECTS, LINES, MASSES, MODEL, case_of, measure, plan_of, strong
 

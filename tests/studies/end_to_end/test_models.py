@@ -6,8 +6,8 @@ import pytest
 
 from rrru.errors import ConfigError
 from rrru.kinematics.dynamics import Masses
+from rrru.pipeline import setup
 from rrru.robots.catalogue import make_mechanism
-from rrru.studies import setup
 from rrru.studies.end_to_end.models import check, errors, sizes
 from tests.schemas import check as checked
 from tests.simulation.simulated import file_of

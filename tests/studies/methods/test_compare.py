@@ -129,7 +129,7 @@ def test_a_perfect_robot_is_left_as_it_is():
 @pytest.mark.parametrize("robot", ["rrru3", "ptt3", "delta"])
 def test_points_outside_lie_around_the_configured_region_and_all_are_reachable(robot):
     config = yaml.safe_load((ROOT / "config.yaml").read_text())
-    validate(config, str(ROOT / "workflow/schemas/config.schema.yaml"))
+    validate(config, str(ROOT / "rrru/pipeline/config.schema.yaml"))
     settings = parts.settings(config, robot) | {"test_points": 20}
     one, region = regions.trial(settings), settings["region"]
 

@@ -73,9 +73,7 @@ def test_it_runs_in_any_folder_and_says_whose_settings_it_takes(mine, tmp_path, 
     here, _ = output_of(capsys, mine)
     monkeypatch.chdir(tmp_path)
     assert output_of(capsys, mine)[0] == here
-    assert str(ROOT / "config.yaml") in "".join(output_of(capsys, "--help")[0].split())
-    monkeypatch.setattr(command, "_CONFIG", tmp_path / "nowhere.yaml")
-    assert "nowhere.yaml: cannot be read" in output_of(capsys, mine)[1]
+    assert str(ROOT / "rrru/pipeline/defaults.yaml") in "".join(output_of(capsys, "--help")[0].split())
 
 
 def test_one_reading_1_mm_off_among_eleven_good_ones_is_suspicious_and_good_ones_are_not():

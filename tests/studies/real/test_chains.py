@@ -22,7 +22,7 @@ from rrru.diagnosis.settings import GapSettings
 from rrru.effects.library import NAMES, find
 from rrru.errors import ConfigError
 from rrru.kinematics.dynamics import Masses
-from rrru.studies import setup
+from rrru.pipeline import setup
 from rrru.studies.real.chains import robot_section, sheet
 
 _FOLDER = Path(os.environ.get("RRRU_REAL_DATA", ""), "justin")

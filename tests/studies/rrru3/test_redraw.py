@@ -7,8 +7,8 @@ import pandas as pd
 import pytest
 import yaml
 
-from rrru.studies import config as parts
-from rrru.studies import setup
+from rrru.pipeline import config as parts
+from rrru.pipeline import setup
 from rrru.studies.rrru3 import paper, redraw, twin
 from rrru.studies.rrru3 import study_numbers as numbers
 from rrru.studies.rrru3.schemas import TABLES

@@ -1,17 +1,5 @@
 # settings of the genetic algorithm itself
-GENETIC_SETTINGS = [f"genetic.{key}" for key in config["genetic"] if key != "seeds"]
-CALIBRATION_TABLES = ["calibrations", "parameters", "gauge", "correlations", "observability"]
-GENETIC_TABLES = ["genetic", "genetic_history", "genetic_parameters", "genetic_against_least_squares"]
-# tables of the whole study: the concatenated parts of the campaigns
-CAMPAIGN_TABLES = [
-    "campaigns",
-    "registration",
-    "singularity",
-    *CALIBRATION_TABLES,
-    *GENETIC_TABLES,
-    "errors",
-    "error_summary",
-]
+GENETIC_SETTINGS = [f"genetic.{key}" for key in config["genetic"] if key not in ("campaigns", "seeds")]
 TARGETS += named(CAMPAIGN_TABLES).values()
 
 
@@ -24,7 +12,7 @@ rule calibrate:
     log:
         f"{RESULTS}/logs/calibrate/{{campaign}}.log",
     params:
-        settings=calibrated(*(f"calibration.{key}" for key in ("loss", "loss_scale_mm", "use_near_singularity"))),
+        settings=calibrated(*parts.CALIBRATION_KEYS),
         code=code("calibrate"),
     script:
         "../../scripts/calibrate.py"
@@ -39,7 +27,7 @@ rule genetic:
     log:
         f"{RESULTS}/logs/genetic/{{campaign}}.log",
     params:
-        settings=calibrated("seed", "genetic", "calibration.use_near_singularity"),
+        settings=calibrated(*parts.GENETIC_KEYS),
         code=code("genetic"),
     script:
         "../../scripts/genetic.py"

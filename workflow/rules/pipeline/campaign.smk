@@ -7,7 +7,7 @@ rule campaign:
         next_runs=lambda wildcards: campaign_advice(wildcards, "gap_next_runs"),
         next_poses=lambda wildcards: campaign_advice(wildcards, "gap_next_poses"),
     output:
-        **named(["measurements", "truth", "singularity", "campaigns", "registration", "workspace"], part),
+        **named(READ_TABLES, part),
     log:
         f"{RESULTS}/logs/campaign/{{campaign}}.log",
     wildcard_constraints:

@@ -5,7 +5,18 @@ import rrru.report
 from rrru.errors import ConfigError
 from rrru.plugins import module_file
 from rrru.store.digest import code_digest
-from rrru.studies import config as parts
+from rrru.pipeline import config as parts
+from rrru.pipeline.jobs.outputs import (
+    CALIBRATION_TABLES,
+    CAMPAIGN_FIGURES,
+    CAMPAIGN_TABLES,
+    GAP_FIGURES,
+    GAP_TABLES,
+    GENETIC_TABLES,
+    READ_TABLES,
+    figure_paths,
+    part_path,
+)
 
 RESULTS = config["results_dir"].rstrip("/")
 CAMPAIGNS = sorted(config["campaigns"])
@@ -16,7 +27,7 @@ TARGETS = []
 # figures {name: ("module:function", tables)} by study; every study adds its own
 FIGURES = {}
 # functions that check a configuration; every study adds its own
-CHECKS = ["rrru.studies.config:check"]
+CHECKS = ["rrru.pipeline.config:check"]
 # studies of papers by the paper's letter: package with `published` and `audit`, tables with the study's numbers, and
 # its part of the configuration
 PAPERS = {}
@@ -30,7 +41,7 @@ wildcard_constraints:
 
 def part(name, campaign="{campaign}"):
     """Path of one campaign's part of a table."""
-    return f"{RESULTS}/campaigns/{campaign}/{name}.parquet"
+    return part_path(RESULTS, campaign, name)
 
 
 def verdict(campaign="{campaign}"):
@@ -55,8 +66,7 @@ def named(names, place=table):
 
 def drawn(figures, folder="figures"):
     """Paths of figures as PDF, PNG and SVG, by name."""
-    kinds = ("pdf", "png", "svg")
-    return {f"{name}_{kind}": f"{RESULTS}/{folder}/{name}.{kind}" for name in figures for kind in kinds}
+    return figure_paths(f"{RESULTS}/{folder}", figures)
 
 
 def shown(figures):
@@ -88,49 +98,17 @@ def campaign_advice(wildcards, name):
 
 def campaign_settings(wildcards):
     """Settings of the job of one campaign."""
-    name, calibration = wildcards.campaign, config["calibration"]
-    return {
-        "campaign": name,
-        "section": parts.source(config, name),
-        "nominal": parts.nominal(config, name),
-        "virtual": parts.virtual(config, name),
-        "sets": parts.sets(config, name),
-        **{key: calibration[key] for key in ("singularity_margin", "use_near_singularity")},
-    }
+    return parts.read_settings(config, wildcards.campaign)
 
 
 def calibrated(*keys, driven=False):
-    """Settings of a job about one campaign's calibrations: its robots (the real one: to be driven, or its
-    deviations) and the configuration under dotted keys.
-    """
-
-    def settings(wildcards):
-        name = wildcards.campaign
-        real = {"virtual": parts.virtual(config, name)} if driven else {"truth": parts.truth(config, name)}
-        result = {"campaign": name, "nominal": parts.nominal(config, name), **real, **reads(*keys)}
-        if "calibration" in result:
-            result["calibration"]["sets"] = parts.sets(config, name)
-        return result
-
-    return settings
+    """Settings of a job about one campaign's calibrations, as a function of the wildcards."""
+    return lambda wildcards: parts.calibration_settings(config, wildcards.campaign, *keys, driven=driven)
 
 
 def diagnosed(wildcards):
-    """Settings of a diagnosis: what is known of the robot, never the truth of a virtual one."""
-    section = DIAGNOSED[wildcards.campaign]
-    return {
-        "campaign": wildcards.campaign,
-        "robot": parts.robot(config, section),
-        "masses": parts.masses(config, section),
-        "noise_mm": section.get("noise_mm") or None,
-        "noise_rad": section.get("noise_rad"),
-        "noise_known": section.get("noise_known", False),
-        "limits": parts.limits(config, section),
-        "use_near_singularity": config["calibration"]["use_near_singularity"],
-        "figures": GAP_FIGURES,
-        "options": {"campaign": wildcards.campaign},
-        **reads("seed", "gap"),
-    }
+    """Settings of a diagnosis."""
+    return parts.diagnosis_settings(config, wildcards.campaign, DIAGNOSED[wildcards.campaign])
 
 
 def own_effects_digests():
@@ -143,18 +121,11 @@ def own_effects():
     return [module_file(name) for name in config["gap"]["own_effects"]]
 
 
-def campaign_options(campaign):
-    """Options of the figures of every campaign."""
-    of_study = parts.of_reproduced_study(config, campaign)
-    method = config["reproduce"]["method"] if of_study else "least_squares"
-    return {"campaign": campaign, "method": method, "mode": "closed_loop"}
-
-
 def paper_options():
     """Options of the figures of paper A."""
     reproduce = config["reproduce"]
     return {
-        **campaign_options(REPRODUCED),
+        **parts.figure_options(config, REPRODUCED),
         "calibration_lines": reproduce["line_calibration"],
         "calibration_spiral": reproduce["spiral_calibration"],
         "sweep_campaign": REPRODUCED,

@@ -1,24 +1,4 @@
 CHECKS.append("rrru.diagnosis.settings:check")
-GAP_TABLES = [
-    "gap_verdicts",
-    "gap_left_out",
-    "gap_budget",
-    "gap_locate",
-    "gap_identifiability",
-    "gap_attribute",
-    "gap_remainder",
-    "gap_sets",
-    "gap_shrink",
-    "gap_parameters",
-    "gap_drive_functions",
-    "gap_next_runs",
-    "gap_next_poses",
-]
-GAP_FIGURES = {
-    "gap": ("rrru.figures.gap:gap", ["gap_verdicts", "gap_budget", "gap_attribute", "gap_shrink", "gap_points"]),
-    "drive_functions": ("rrru.figures.drive_functions:drive_functions", ["gap_drive_functions"]),
-    "gap_map": ("rrru.figures.gap:gap_map", ["gap_verdicts", "gap_points"]),
-}
 
 
 # one job per campaign with its figures, because starting another job takes longer than drawing them. It reads the

@@ -31,13 +31,6 @@ PAPERS["A"] = {
         ),
     },
 }
-# figures of every campaign, those of the reproduced one in figures/ itself
-CAMPAIGN_FIGURES = {
-    "workspace": ("rrru.figures.workspace:workspace", ["workspace", "singularity", "measurements", "campaigns"]),
-    "observability": ("rrru.figures.observability:observability", ["observability"]),
-    "convergence": ("rrru.figures.convergence:convergence", ["genetic_history", "genetic"]),
-    "cross": ("rrru.figures.cross:cross", ["error_summary"]),
-}
 
 
 # all values and seeds of one swept setting in one interpretation of the paper
@@ -149,7 +142,7 @@ rule campaign_figures:
     params:
         settings=lambda wildcards: {
             "figures": CAMPAIGN_FIGURES,
-            "options": campaign_options(wildcards.campaign),
+            "options": parts.figure_options(config, wildcards.campaign),
         },
         code=code("figure", CAMPAIGN_FIGURES),
     script:

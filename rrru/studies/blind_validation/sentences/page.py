@@ -9,9 +9,9 @@ from rrru.diagnosis.correction.corrected_model import write_corrected
 from rrru.diagnosis.diagnose import Diagnosis, MeasuredRobot, diagnose
 from rrru.diagnosis.verdict_text import answer
 from rrru.kinematics.dynamics import Masses
+from rrru.pipeline import campaigns, setup
+from rrru.pipeline import config as parts
 from rrru.robots.drive_words import drive_words
-from rrru.studies import campaigns, setup
-from rrru.studies import config as parts
 
 _CORRECTED = {"urdf": "corrected.urdf", "mjcf": "corrected.xml"}
 

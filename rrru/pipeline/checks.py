@@ -13,14 +13,17 @@ from rrru.store.digest import code_digest
 
 # a larger number is a typing error, and results from it may overflow
 _MAX_NUMBER = 1e15
+# sections that are whole in every configuration, and keywords of a schema that ask for something to be there
+_WHOLE = ("gap", "calibration", "loads")
+_COUNTED = ("required", "minProperties")
 _LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
 
-def check_schema(config, file):
+def check_schema(config, file, parts=False):
     """Raise ConfigError with place and value where a configuration does not fit the JSON schema of a file.
 
-    Types are stricter than those of JSON, since YAML allows more: numbers are finite, 3.0 is not a count, 1 and `no`
-    are not names.
+    parts: sections and the keys of each may be missing, as in what the package's defaults hold. Types are stricter than
+    those of JSON, since YAML allows more: numbers are finite, 3.0 is not a count, 1 and `no` are not names.
     """
     # installed with Snakemake
     from jsonschema import Draft202012Validator as Usual
@@ -29,12 +32,22 @@ def check_schema(config, file):
     kinds = {name: lambda _, value, fits=fits: fits(value) for name, (fits, _) in _STRICT.items()}
     strict = validators.extend(Usual, type_checker=Usual.TYPE_CHECKER.redefine_many(kinds))
     rules = yaml.load(Path(file).read_text(), Loader=_LOADER)
+    if parts:
+        # robots and campaigns are whole, the sections of studies are not
+        whole = {name: rules["properties"][name] for name in _WHOLE}
+        partly = {name: _without(one, _COUNTED) for name, one in rules["properties"].items()}
+        rules = _without(rules, _COUNTED) | {"properties": partly | whole}
     error = exceptions.best_match(strict(rules).iter_errors(config))
     if error:
         kind = error.validator_value if error.validator == "type" else None
         allowed = f"; allowed: {_STRICT[kind][1]}" if isinstance(kind, str) and kind in _STRICT else ""
         place = ".".join(map(str, error.absolute_path)) or "configuration"
         raise ConfigError(f"{place}: {error.message}{allowed}{_as_number(error)}{_meant(error)}")
+
+
+def _without(rules, keys):
+    """A mapping without some keys."""
+    return {key: value for key, value in rules.items() if key not in keys}
 
 
 def check_keys(files):

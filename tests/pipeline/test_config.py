@@ -3,8 +3,8 @@
 import yaml
 
 from rrru.diagnosis.design.run_limits import StatedLimits
-from rrru.studies import setup
-from rrru.studies.config import limits, of_reproduced_study, robot, sets, source
+from rrru.pipeline import setup
+from rrru.pipeline.config import limits, of_reproduced_study, robot, sets, source
 from tests.places import ROOT
 
 CONFIG = yaml.safe_load((ROOT / "config.yaml").read_text())

@@ -7,8 +7,8 @@ import pandas as pd
 import pytest
 
 from rrru.campaign.measurements import vector_columns
+from rrru.pipeline.campaigns import workspace_table
 from rrru.robots.catalogue import make_mechanism
-from rrru.studies.campaigns import workspace_table
 
 _LOW, _HIGH = np.array([0.0, 100.0, -50.0]), np.array([1000.0, 800.0, 450.0])
 

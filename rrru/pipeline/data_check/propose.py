@@ -21,8 +21,8 @@ from rrru.campaign.ingest.spec import MM, RAD, IngestSpec
 from rrru.campaign.stated_motion import STOP_AND_GO
 from rrru.errors import IngestError, RrruError
 from rrru.kinematics.robot import Robot
-from rrru.studies import config as parts
-from rrru.studies import setup
+from rrru.pipeline import config as parts
+from rrru.pipeline import setup
 
 # number of points for the test whether a file is of a robot
 _PROBES = 20

@@ -7,8 +7,13 @@ import hashlib
 from pathlib import Path
 
 from rrru.errors import ConfigError
+from rrru.pipeline.jobs.outputs import GAP_FIGURES
 from rrru.plugins import module_file
+from rrru.robots.catalogue import OWN
 
+# keys that the job of a calibration reads besides robot and sets, and that of the genetic algorithm
+CALIBRATION_KEYS = tuple(f"calibration.{key}" for key in ("loss", "loss_scale_mm", "use_near_singularity"))
+GENETIC_KEYS = ("seed", "genetic", "calibration.use_near_singularity")
 # keys of a campaign's section that only drive it, or limit further runs
 _DRIVEN = ("trajectories", "passes", "advised_by", "limits")
 
@@ -60,6 +65,11 @@ def own_robot_file(dimensions):
     return next((Path(dimensions[key]) for key in ("urdf", "mjcf") if key in dimensions), None)
 
 
+def own_robot(entry):
+    """Whether a `robots:` entry describes a robot of the user's own."""
+    return any(key in entry for key in OWN)
+
+
 def corrected_kind(config, section):
     """Ending of the corrected file of a campaign's robot, "xml" or "urdf"; "" for a robot without such a file."""
     own = config["robots"].get(section["robot"], {})
@@ -81,8 +91,8 @@ def sets(config, name):
 
 def of_reproduced_study(config, name):
     """Whether a campaign's robot is that of the reproduced study, whose sets and objective it then shares."""
-    reproduced = config["reproduce"]["campaign"]
-    return config["campaigns"][name]["robot"] == config["campaigns"][reproduced]["robot"]
+    reproduced = config["campaigns"].get(config.get("reproduce", {}).get("campaign"))
+    return reproduced is not None and config["campaigns"][name]["robot"] == reproduced["robot"]
 
 
 def source(config, name):
@@ -114,11 +124,58 @@ def virtual(config, name):
     }
 
 
+def read_settings(config, name):
+    """Settings of the job that drives or reads a campaign."""
+    calibration = config["calibration"]
+    return {
+        "campaign": name,
+        "section": source(config, name),
+        "nominal": nominal(config, name),
+        "virtual": virtual(config, name),
+        "sets": sets(config, name),
+        **{key: calibration[key] for key in ("singularity_margin", "use_near_singularity")},
+    }
+
+
+def calibration_settings(config, name, *keys, driven=False):
+    """Settings of a job about a campaign's calibrations: its robots, and the configuration under dotted keys.
+
+    driven: the real robot is driven again; otherwise only its true deviations are given.
+    """
+    real = {"virtual": virtual(config, name)} if driven else {"truth": truth(config, name)}
+    result = {"campaign": name, "nominal": nominal(config, name), **real, **part(config, *keys)}
+    if "calibration" in result:
+        result["calibration"]["sets"] = sets(config, name)
+    return result
+
+
+def diagnosis_settings(config, name, section):
+    """Settings of a diagnosis: what is known of the robot of a campaign's section, never the truth of a virtual one."""
+    return {
+        "campaign": name,
+        "robot": robot(config, section),
+        "masses": masses(config, section),
+        "noise_mm": section.get("noise_mm") or None,
+        "noise_rad": section.get("noise_rad"),
+        "noise_known": section.get("noise_known", False),
+        "limits": limits(config, section),
+        "use_near_singularity": config["calibration"]["use_near_singularity"],
+        "figures": GAP_FIGURES,
+        "options": {"campaign": name},
+        **part(config, "seed", "gap"),
+    }
+
+
+def figure_options(config, name):
+    """Options of the figures of a campaign."""
+    method = config["reproduce"]["method"] if of_reproduced_study(config, name) else "least_squares"
+    return {"campaign": name, "method": method, "mode": "closed_loop"}
+
+
 def masses(config, section):
     """Masses in kg; that of the platform from the campaign's section where stated."""
     loads = config["loads"]
-    own = config["robots"].get(section.get("robot"), {})
-    if "dh" in own or own_robot_file(own):
+    if own_robot(config["robots"].get(section.get("robot"), {})):
         return {"platform_kg": section.get("platform_mass_kg", 0.0), "forearm_kg": 0.0, "arm_kg": 0.0}
     return {
         "platform_kg": section.get("platform_mass_kg", loads["platform_mass_kg"]),
@@ -163,7 +220,7 @@ def _check_virtual(config, name, section):
     """Raise ConfigError where a virtual campaign's robot, trajectories or passes refer to missing entries."""
     real = entry(config, "virtual_robots", section["virtual"], f"campaigns.{name}")
     if "mujoco" in real:
-        from rrru.studies import setup
+        from rrru.pipeline import setup
 
         setup.real_robot(nominal(config, name), real)
     known = trajectory_names(entry(config, "trajectories", section["trajectories"], f"campaigns.{name}"))

@@ -14,14 +14,14 @@ from hypothesis import given
 from snakemake.utils import update_config, validate
 
 from rrru.errors import ConfigError
-from rrru.studies import config as parts
-from rrru.studies.checks import check_schema
+from rrru.pipeline import config as parts
+from rrru.pipeline.checks import check_schema
 from rrru.studies.ptt3 import parts as ptt
 from rrru.studies.rrru3 import settings as paper_a
 from tests.broken import COUNT, EDITS, counted, edited, many
 from tests.places import ROOT
 
-SCHEMA = ROOT / "workflow/schemas/config.schema.yaml"
+SCHEMA = ROOT / "rrru/pipeline/config.schema.yaml"
 RULES = "".join(file.read_text() for file in sorted((ROOT / "workflow/rules").rglob("*.smk")))
 CHECKS = [name for line in RULES.splitlines() if "CHECKS" in line for name in re.findall(r'"(rrru[.\w]+:\w+)"', line)]
 

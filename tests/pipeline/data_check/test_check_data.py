@@ -10,20 +10,27 @@ import yaml
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
+from rrru import cli
 from rrru.campaign.ingest.campaign_file import ingest
 from rrru.campaign.ingest.spec import IngestSpec
+from rrru.pipeline import config as parts
+from rrru.pipeline import setup
+from rrru.pipeline.data_check.check_data import check_file
+from rrru.pipeline.read_config import read_config
 from rrru.robots.rrru3 import Rrru3
-from rrru.studies import config as parts
-from rrru.studies import setup
-from rrru.studies.data_check.check_data import check_file, main, read_config
 from tests.campaign.ingest.samples import SAMPLES, section
 from tests.places import DATA, ROOT
 
 ROBOT = Rrru3()
-CONFIG = read_config([], ROOT / "config.yaml") | {"campaigns": {}}
-SCHEMA = yaml.safe_load((ROOT / "workflow" / "schemas" / "config.schema.yaml").read_text())
+CONFIG = read_config([ROOT / "config.yaml"]) | {"campaigns": {}}
+SCHEMA = yaml.safe_load((ROOT / "rrru" / "pipeline" / "config.schema.yaml").read_text())
 FIELD = pd.read_csv(DATA / "field_09.csv")
 LENGTHS = [f"{name}_{axis}_mm" for name in ("command", "measured") for axis in "xyz"]
+
+
+def main(arguments):
+    """The exit code of `rrru check` under the studies' configuration."""
+    return cli.main(["check", *arguments, *([] if "--config" in arguments else ["--config", "config.yaml"])])
 
 
 def proposed(found):
@@ -213,7 +220,7 @@ def test_the_command_prints_an_overlay(tmp_path, monkeypatch, capsys):
     text = capsys.readouterr().out
     overlay = yaml.safe_load(text.partition("overlay to paste:")[2])
     assert overlay == {"campaigns": {"field_12": {"robot": "rrru3", "ingest": "data/field_12.csv"}}}
-    assert "snakemake --cores 2 results/campaigns/field_12/report.html --configfile mine.yaml" in text
+    assert "# saved as mine.yaml: rrru diagnose field_12 --config config.yaml mine.yaml" in text
     # what the file cannot tell is there to be filled in
     filled = yaml.safe_load(
         text.partition("overlay to paste:")[2].replace("# noise_mm", "noise_mm").replace("# pl", "pl")
@@ -233,21 +240,25 @@ def test_the_printed_overlay_is_the_proposed_one_whatever_the_file_is_called(ste
 
 
 @pytest.mark.parametrize(
-    ("arguments", "said"),
+    ("arguments", "said", "code"),
     [
-        (["nothere.csv", "--robot", "rrru3"], "no such file"),
-        (["data", "--robot", "rrru3"], "a directory"),
-        (["data/field_12.csv"], "say which robot: ROBOT=.. (--robot ..); allowed: rrru3"),
-        (["data/field_12.csv"], "this file fits rrru3"),
-        (["data/field_01.csv", "--robot", "rrru9"], "robot is 'rrru9'"),
-        (["data/field_01.csv", "--robot", "rrru3", "--configfile", "nothere.yaml"], "nothere.yaml"),
-        (["data/field_01.csv", "--robot", "rrru3", "--configfile", "Makefile"], "allowed: a YAML file"),
-        (["data/field_01.csv", "--robot", "rrru3", "--commands", "nothere.csv"], "nothere.csv: got no such file"),
+        (["nothere.csv", "--robot", "rrru3"], "no such file", cli.REFUSED),
+        (["data", "--robot", "rrru3"], "a directory", cli.REFUSED),
+        (["data/field_12.csv"], "say which robot: --robot .. (ROBOT=..); allowed: rrru3", cli.WRONG),
+        (["data/field_12.csv"], "this file fits rrru3", cli.WRONG),
+        (["data/field_01.csv", "--robot", "rrru9"], "robot 'rrru9': there is no such file", cli.WRONG),
+        (["data/field_01.csv", "--robot", "rrru3", "--config", "nothere.yaml"], "nothere.yaml", cli.WRONG),
+        (["data/field_01.csv", "--robot", "rrru3", "--config", "Makefile"], "allowed: a YAML file", cli.WRONG),
+        (
+            ["data/field_01.csv", "--robot", "rrru3", "--commands", "nothere.csv"],
+            "nothere.csv: got no such file",
+            cli.REFUSED,
+        ),
     ],
 )
-def test_an_impossible_check_gets_a_message_without_a_traceback(arguments, said, monkeypatch, capsys):
+def test_an_impossible_check_gets_a_message_without_a_traceback(arguments, said, code, monkeypatch, capsys):
     monkeypatch.chdir(ROOT)
-    assert main(arguments) == 2
+    assert main(arguments) == code
     assert said in capsys.readouterr().err
 
 

@@ -1,4 +1,4 @@
-"""Construction of robots and campaigns from the parts of the configuration by `rrru.studies.config`."""
+"""Construction of robots and campaigns from the parts of the configuration by `rrru.pipeline.config`."""
 
 from dataclasses import dataclass, field, replace
 
@@ -110,7 +110,7 @@ def virtual_campaign(nominal, virtual, advice=None):
     )
     if advice is not None and len(advice[0]):
         # a diagnosis is not small, and campaigns that follow none do not need it
-        from rrru.studies.advised import advised_runs
+        from rrru.pipeline.advised import advised_runs
 
         more = advised_runs(advice[0].iloc[0].to_dict(), advice[1], virtual["trajectories"], motion)
         plan = replace(plan, runs=(*plan.runs, *more))

@@ -11,8 +11,8 @@ from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.settings import GapSettings
 from rrru.errors import FitError, RrruError
 from rrru.kinematics.dynamics import Masses
-from rrru.studies import config as parts
-from rrru.studies import setup
+from rrru.pipeline import config as parts
+from rrru.pipeline import setup
 
 # share of points from the other side below which a drive counts as always approached from one side
 _ONE_WAY = 0.02

@@ -1,10 +1,8 @@
 """Check of a file of measurements: its contents, used columns, missing data and their effects, and an overlay to paste.
 
-python -m rrru.studies.data_check.check_data FILE --robot rrru3 [--commands FILE] [--configfile mine.yaml]
+The command `rrru check` prints it.
 """
 
-import argparse
-import sys
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -15,10 +13,10 @@ from rrru.campaign.ingest.problems import Problems
 from rrru.campaign.ingest.sheet import COMMAND, position_text
 from rrru.campaign.ingest.spec import IngestSpec
 from rrru.campaign.stated_motion import STOP_AND_GO
-from rrru.errors import ConfigError, IngestError, RrruError
-from rrru.studies.checks import check_keys
-from rrru.studies.data_check.costs import costs, without_times
-from rrru.studies.data_check.propose import fitting_robots, propose
+from rrru.errors import ConfigError, IngestError
+from rrru.pipeline.config import own_robot
+from rrru.pipeline.data_check.costs import costs, without_times
+from rrru.pipeline.data_check.propose import fitting_robots, propose
 
 _SHOWN = 8
 # longest line of the overlay
@@ -72,8 +70,8 @@ def check_file(file, config, robot=None, commands=None):
     arguments = {key: value for key, value in (("robot", robot), ("commands", commands)) if value}
     given = {"robot": None, "ingest": str(file)} | section | arguments
     if given["robot"] not in config["robots"]:
-        named = f"robot is {given['robot']!r}" if given["robot"] else "say which robot: ROBOT=.. (--robot ..)"
-        known = f"allowed: {', '.join(config['robots'])}, or one of your own with CONFIG=.. (--configfile ..)"
+        named = f"robot is {given['robot']!r}" if given["robot"] else "say which robot: --robot .. (ROBOT=..)"
+        known = f"allowed: {', '.join(config['robots'])}, or a URDF or MJCF file, or one of a --config file (CONFIG=..)"
         fitting = " and ".join(fitting_robots(given, config))
         raise ConfigError(f"{named}; {known}" + (f"; this file fits {fitting}" if fitting else ""))
     found = propose(given, config)
@@ -132,60 +130,31 @@ def _meant(found, mechanism):
         yield f"meant: payload_kg hangs at {tool}"
 
 
-def read_config(overlays, base="config.yaml"):
-    """The configuration under overlays; raises ConfigError for a file that is not a YAML mapping."""
-    config = {}
-    check_keys((base, *overlays))
-    for file in (base, *overlays):
-        try:
-            section = yaml.safe_load(Path(file).read_text(encoding="utf-8"))
-        except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-            raise ConfigError(f"{file}: {' '.join(str(error).split())}; allowed: a YAML file") from error
-        if not isinstance(section, dict):
-            raise ConfigError(f"{file} holds {type(section).__name__}; allowed: a mapping of sections")
-        config = _merged(config, section)
-    return config
+def print_check(file, config, robot=None, commands=None, overlays=()):
+    """Print the check of a file; returns whether ingest accepts it. Arguments and errors as for `check_file`.
 
-
-def _merged(below, above):
-    """A mapping with the entries of another one on top."""
-    both = {
-        key: _merged(below[key], value) if isinstance(value, dict) and isinstance(below.get(key), dict) else value
-        for key, value in above.items()
-    }
-    return below | both
-
-
-def main(arguments=None):
-    """Print the check of a file; the exit code is 1 where ingest would refuse it, 2 where there is no result."""
-    parser = argparse.ArgumentParser(prog="check_data", description=__doc__.splitlines()[0])
-    parser.add_argument("file")
-    parser.add_argument("--robot", help="entry of robots: in the configuration")
-    parser.add_argument("--commands", help="second file with what was commanded")
-    parser.add_argument("--configfile", nargs="*", default=[], help="overlays of config.yaml")
-    given = parser.parse_args(arguments)
-    try:
-        config = read_config(given.configfile)
-        found = check_file(given.file, config, given.robot, given.commands)
-    except RrruError as error:
-        print(error, file=sys.stderr)
-        return 2
+    overlays: files of the configuration, for the command that is proposed.
+    """
+    found = check_file(file, config, robot, commands)
     print("\n".join(found.lines))
     for problem in found.refused[:_SHOWN]:
         print(f"refused: {IngestError([problem])}")
     if len(found.refused) > _SHOWN:
         print(f"refused: {len(found.refused) - _SHOWN} problems more")
     print(f"\n{_UNFINISHED if found.refused else 'overlay to paste:'}\n")
-    print(_pasted(found))
+    name = found.section["robot"]
+    own = {name: config["robots"][name]} if own_robot(config["robots"][name]) and not overlays else {}
+    print(_pasted(found, own))
     if not found.refused:
-        page, overlays = f"{config['results_dir'].rstrip('/')}/campaigns/{found.name}/report.html", given.configfile
-        print(f"# saved as mine.yaml: snakemake --cores 2 {page} --configfile {' '.join([*overlays, 'mine.yaml'])}")
-    return 1 if found.refused else 0
+        files = " ".join([*map(str, overlays), "mine.yaml"])
+        print(f"# saved as mine.yaml: rrru diagnose {found.name} --config {files}")
+    return not found.refused
 
 
-def _pasted(found):
-    """The overlay as text, with the values that no file has as comments."""
-    lines = ["campaigns:", f"  {yaml.safe_dump(found.name).splitlines()[0]}:"]
+def _pasted(found, robots):
+    """The overlay as text, with the values that no file has as comments; robots: entries that it needs as well."""
+    lines = yaml.safe_dump({"robots": robots}, sort_keys=False).splitlines() if robots else []
+    lines += ["campaigns:", f"  {yaml.safe_dump(found.name).splitlines()[0]}:"]
     for key, value in found.section.items():
         short, long = (
             yaml.safe_dump({key: value}, sort_keys=False, allow_unicode=True, default_flow_style=flow, width=1000)
@@ -196,7 +165,3 @@ def _pasted(found):
     if found.section.get("motion") == STOP_AND_GO:
         lines.append(f"    # {_BETWEEN}")
     return "\n".join(lines)
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -1,0 +1,302 @@
+"""The command `rrru`: from a file of measurements to its cause on the terminal, and into a folder of results.
+
+Exit codes: 0 done; 1 the file is refused, or the data do not determine an answer; 2 a wrong argument, configuration or
+robot; 3 an error of rrru itself, which `--debug` shows with its traceback.
+"""
+
+import argparse
+import os
+import shutil
+import sys
+import textwrap
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from rrru import __version__
+from rrru.errors import ConfigError, FitError, IngestError, RrruError, SimulationError, UnreachableError
+
+DONE, REFUSED, WRONG, FAILED = range(4)
+_OF_DATA = (IngestError, FitError, UnreachableError, SimulationError)
+_WIDEST = 100
+_BOLD, _DIM, _PLAIN = "\033[1m", "\033[2m", "\033[0m"
+# options of a robot's file, as arguments of `rrru.load_robot`
+_OF_ROBOT = ("tip", "base", "platform")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command; returns its exit code."""
+    options = _parser().parse_args(arguments)
+    # libraries that compute with several threads give other last digits, and are slower on matrices of this size
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+        os.environ.setdefault(name, "1")
+    run: Callable[[argparse.Namespace], int] = options.run
+    try:
+        return run(options)
+    except KeyboardInterrupt:
+        return 130
+    except BrokenPipeError:
+        # the reader of the output, such as `head`, has ended; Python would report it once more on closing
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return DONE
+    except Exception as error:
+        if options.debug:
+            raise
+        known = isinstance(error, RrruError)
+        said = str(error) if known else f"rrru failed: {type(error).__name__}: {error}; run it again with --debug"
+        print(_bold("error: ", sys.stderr) + said, file=sys.stderr)
+        return FAILED if not known else REFUSED if isinstance(error, _OF_DATA) else WRONG
+
+
+def _parser() -> argparse.ArgumentParser:
+    """The command line."""
+    parser = argparse.ArgumentParser(
+        prog="rrru",
+        description="Why does a calibrated robot still miss? Calibration and diagnosis from a file of measurements.",
+        epilog="Exit codes: 0 done; 1 data refused, or no answer from them; 2 wrong argument; 3 failure of rrru.",
+    )
+    parser.add_argument("--version", action="version", version=f"rrru {__version__}")
+    parser.set_defaults(debug=False)
+    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+    about = "calibrate and diagnose: answer, page, JSON, tables, corrected file"
+    one = _command(commands, "diagnose", _diagnose, about, _campaign)
+    one.add_argument("--out", default="results", metavar="FOLDER", help="folder of results; default: %(default)s")
+    one.add_argument("--effects", nargs="+", metavar="NAME", help="effects that may act; default: all")
+    one.add_argument("--json", action="store_true", help="print the answer as JSON")
+    about = "what is in a file: its columns, what is missing, what a run would refuse, and a section to paste"
+    _command(commands, "check", _check, about, _campaign)
+    one = _command(commands, "compare", _compare, "which of two calibrations to trust, as a page")
+    one.add_argument("first", metavar="A", help="folder of results, FOLDER:CAMPAIGN, or a campaign of results")
+    one.add_argument("second", metavar="B")
+    one.add_argument("--page", default="compare.html", metavar="FILE", help="default: %(default)s")
+    one = _command(commands, "printer", _printer, "check of a delta printer's calibration")
+    one.add_argument("files", nargs="+", metavar="FILE", help="Klipper's printer.cfg, or JSON as in docs/printers.md")
+    one.add_argument("--page", metavar="FILE.html", help="also write the answer to a page")
+    _command(commands, "robots", _robots, "the package's robots and those of a configuration", _config)
+    one = _command(commands, "effects", _effects, "the effects that may act on a robot", _config)
+    one.add_argument("--robot", default="rrru3", help="file or name; default: %(default)s")
+    _of_robot(one)
+    return parser
+
+
+def _command(
+    commands: Any,
+    name: str,
+    run: Callable[[argparse.Namespace], int],
+    about: str,
+    *arguments: Callable[[argparse.ArgumentParser], None],
+) -> argparse.ArgumentParser:
+    """A subcommand with the arguments that it shares with others."""
+    parser: argparse.ArgumentParser = commands.add_parser(
+        name, help=about, description=f"{about[0].upper()}{about[1:]}."
+    )
+    parser.set_defaults(run=run)
+    parser.add_argument("--debug", action="store_true", help="show the traceback of an error")
+    for add in arguments:
+        add(parser)
+    return parser
+
+
+def _campaign(parser: argparse.ArgumentParser) -> None:
+    """Arguments that state a campaign."""
+    parser.add_argument("file", metavar="FILE", help="file of measurements, or a campaign of --config")
+    parser.add_argument("--robot", help="URDF or MJCF file, or a name of `rrru robots`")
+    _of_robot(parser)
+    parser.add_argument("--noise", type=float, metavar="MM", help="of the instrument, 1 sigma per axis")
+    parser.add_argument("--noise-rad", type=float, metavar="RAD", help="of measured orientations, 1 sigma per axis")
+    parser.add_argument("--frame", choices=("robot", "register"), help="register: the instrument's frame is unknown")
+    parser.add_argument("--target", action="append", default=[], metavar="NAME=X,Y,Z", help="reflector's place in mm")
+    parser.add_argument("--commands", metavar="FILE", help="second file with the commanded positions")
+    parser.add_argument("--name", help="of the campaign; default: that of the file")
+    parser.add_argument(
+        "--set", action="append", default=[], metavar="KEY=VALUE", help="any other key of docs/own-data.md"
+    )
+    _config(parser)
+
+
+def _of_robot(parser: argparse.ArgumentParser) -> None:
+    """Arguments about a robot's file."""
+    parser.add_argument("--tip", help="URDF: link that carries the measured point")
+    parser.add_argument("--base", help="URDF: fixed link")
+    parser.add_argument("--platform", help="MJCF: body that carries the measured point")
+
+
+def _config(parser: argparse.ArgumentParser) -> None:
+    """The configuration's argument."""
+    parser.add_argument(
+        "--config", nargs="+", default=[], metavar="YAML", help="configurations, each on top of the last"
+    )
+
+
+def _stated(options: argparse.Namespace) -> tuple[dict[str, Any], str]:
+    """The configuration with the campaign of the arguments, and the campaign's name."""
+    from rrru.api import as_name
+    from rrru.pipeline.read_config import check_config, merged, read_config
+
+    config = read_config(options.config)
+    name, section = options.file, config["campaigns"].get(options.file)
+    if section is None:
+        name, section = options.name or as_name(Path(options.file).stem), {"ingest": options.file}
+    config, robot = _with_robot(options, config)
+    section = section | ({"robot": robot} if robot else {}) | _keys(options)
+    config = merged(config, {"campaigns": {name: section}})
+    if "robot" in section:
+        check_config(config)
+    return config, name
+
+
+def _with_robot(options: argparse.Namespace, config: dict[str, Any]) -> tuple[dict[str, Any], str | None]:
+    """The configuration with the robot of the arguments, and the robot's name, None where none is stated."""
+    from rrru import api
+    from rrru.pipeline.read_config import merged
+
+    if options.robot is None or options.robot in config["robots"]:
+        return config, options.robot
+    robot = api.load_robot(options.robot, **{key: getattr(options, key) for key in _OF_ROBOT})
+    return merged(config, {"robots": {robot.name: robot.entry}}), robot.name
+
+
+def _keys(options: argparse.Namespace) -> dict[str, Any]:
+    """Keys of the campaign's section that arguments state."""
+    stated = {"noise_mm": options.noise, "noise_rad": options.noise_rad, "frame": options.frame}
+    stated |= {"commands": options.commands}
+    keys = {key: value for key, value in stated.items() if value is not None}
+    if options.target:
+        keys["targets"] = dict(_target(text) for text in options.target)
+    for text in options.set:
+        key, equals, value = text.partition("=")
+        if not equals:
+            raise ConfigError(f"--set {text}: no =; allowed: KEY=VALUE, such as unit=m")
+        try:
+            keys[key] = yaml.safe_load(value)
+        except yaml.YAMLError as error:
+            raise ConfigError(f"--set {text}: {' '.join(str(error).split())}; allowed: a value as in YAML") from error
+    return keys
+
+
+def _target(text: str) -> tuple[str, list[float]]:
+    """Name and place of NAME=X,Y,Z."""
+    name, _, place = text.partition("=")
+    try:
+        numbers = [float(number) for number in place.split(",")]
+    except ValueError:
+        numbers = []
+    if len(numbers) != 3:
+        raise ConfigError(f"--target {text}: no place; allowed: NAME=X,Y,Z in mm, such as ball=30,0,60")
+    return name, numbers
+
+
+def _diagnose(options: argparse.Namespace) -> int:
+    """Read, calibrate and diagnose a campaign; write its results and print the answer."""
+    from rrru import api
+
+    config, name = _stated(options)
+    if "robot" not in config["campaigns"][name]:
+        known = ", ".join(config["robots"])
+        raise ConfigError(f"no robot is stated; allowed: --robot with a URDF or MJCF file, or one of {known}")
+    campaign = api.configured_campaign(name, config)
+    shown = sys.stderr.isatty()
+    diagnosis = api.diagnose(campaign, effects=options.effects, progress=shown)
+    page = diagnosis.write(options.out)
+    if options.json:
+        print(page.with_name("verdict.json").read_text(encoding="utf-8"), end="")
+    else:
+        _print_answer(campaign, diagnosis, page)
+    return REFUSED if diagnosis.verdict["no_answer"] else DONE
+
+
+def _print_answer(campaign: Any, diagnosis: Any, page: Path) -> None:
+    """The answer as text: the sentences, what was noted, and where the results are."""
+    lead, *others = diagnosis.sentences
+    print(_wrapped(_bold(lead)))
+    for sentence in others:
+        print(_wrapped(sentence))
+    for note in (*campaign.notes, *diagnosis.verdict["notes"]):
+        print(_dim(_wrapped(f"note: {note}")))
+    print()
+    for label, path in (("page", page), ("answer as JSON", page.with_name("verdict.json")), ("tables", page.parent)):
+        print(f"{label}: {path}")
+    for path in sorted(page.parent.glob("corrected.*")):
+        print(f"corrected file: {path}")
+
+
+def _check(options: argparse.Namespace) -> int:
+    """What is in a file."""
+    from rrru.pipeline.data_check.check_data import print_check
+
+    config, name = _stated(options)
+    section = config["campaigns"][name]
+    if "ingest" not in section:
+        raise ConfigError(f"campaign {name} is a virtual one; allowed: a file, or a measured campaign")
+    accepted = print_check(section["ingest"], config, section.get("robot"), None, options.config)
+    return DONE if accepted else REFUSED
+
+
+def _compare(options: argparse.Namespace) -> int:
+    """A page on two calibrations."""
+    from rrru.report import compare_page
+
+    compare_page.write(options.first, options.second, options.page)
+    print(f"page: {options.page}")
+    return DONE
+
+
+def _printer(options: argparse.Namespace) -> int:
+    """The answer for delta printers."""
+    from rrru.studies.printers.command import answer_files
+
+    return DONE if answer_files(options.files, options.page) else REFUSED
+
+
+def _robots(options: argparse.Namespace) -> int:
+    """Names of the robots, with their drives."""
+    from rrru.api import RobotModel
+    from rrru.pipeline.read_config import read_config
+
+    for name, entry in read_config(options.config)["robots"].items():
+        robot = RobotModel(name, entry)
+        print(f"{name}: drives {', '.join(robot.drives)}; parameters {', '.join(robot.parameters)}")
+    return DONE
+
+
+def _effects(options: argparse.Namespace) -> int:
+    """Names of the effects that a robot may have, with what each is."""
+    from rrru.api import RobotModel
+    from rrru.effects.causes import cause_texts
+    from rrru.effects.library import library
+    from rrru.pipeline.read_config import read_config
+    from rrru.robots.drive_words import drive_words
+
+    config, name = _with_robot(options, read_config(options.config))
+    robot = RobotModel(name, config["robots"][name]).mechanism
+    words = drive_words(robot)
+    for effect in library(robot):
+        print(_wrapped(f"{effect}: {cause_texts(effect, words).meaning}"))
+    return DONE
+
+
+def _wrapped(text: str) -> str:
+    """A text in lines of the terminal's width."""
+    width = min(shutil.get_terminal_size().columns, _WIDEST)
+    return textwrap.fill(text, width, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False)
+
+
+def _bold(text: str, stream: Any = None) -> str:
+    """A text in bold where the stream is a terminal."""
+    return f"{_BOLD}{text}{_PLAIN}" if _coloured(stream or sys.stdout) else text
+
+
+def _dim(text: str) -> str:
+    """A text less bright where the output is a terminal."""
+    return f"{_DIM}{text}{_PLAIN}" if _coloured(sys.stdout) else text
+
+
+def _coloured(stream: Any) -> bool:
+    """Whether a stream is a terminal whose user has not asked for plain text, https://no-color.org."""
+    return bool(stream.isatty()) and not os.environ.get("NO_COLOR")
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,81 @@
+"""Diagnosis of one campaign's gap between calibrated model and measurements, with its figures."""
+
+import pandas as pd
+
+from rrru.campaign.noise import read_noise
+from rrru.diagnosis import diagnose as core
+from rrru.diagnosis.design.run_limits import StatedLimits
+from rrru.diagnosis.schemas import TABLES, tables_of
+from rrru.diagnosis.settings import GapSettings
+from rrru.diagnosis.verdict_text import answer
+from rrru.figures.drawing import draw_all
+from rrru.kinematics.dynamics import Masses
+from rrru.pipeline import setup
+from rrru.robots.drive_words import drive_words
+from rrru.store import json_files, tables
+
+
+def main(settings, inputs, outputs):
+    """Write the verdict, its tables and its figures."""
+    measurements = tables.read(inputs["measurements"])
+    result = diagnose(settings, measurements)
+    if "corrected" in outputs:
+        result = with_corrected(settings, result, outputs["corrected"])
+    write(settings, result, setup.measured_robot(settings["robot"], measurements), outputs)
+
+
+def diagnose(settings, measurements, progress=None):
+    """The `rrru.diagnosis.diagnose.Diagnosis` of a campaign's measurement table.
+
+    progress: called with the name of each step before it begins. Raises FitError where the readings do not determine
+    the calibration, and ConfigError for settings that do not fit together.
+    """
+    noise = {key: settings[key] for key in ("noise_mm", "noise_rad", "noise_known")}
+    noise["noise_mm"] = noise["noise_mm"] or read_noise(measurements)
+    robot = core.MeasuredRobot(
+        setup.measured_robot(settings["robot"], measurements),
+        Masses(**settings["masses"]),
+        campaign=settings["campaign"],
+        limits=StatedLimits.from_config(settings["limits"]),
+        **noise,
+    )
+    chosen = GapSettings.from_config(settings["gap"], settings["seed"], settings["use_near_singularity"])
+    return core.diagnose(measurements, robot, chosen, progress=progress)
+
+
+def with_corrected(settings, result, path):
+    """The Diagnosis with what its robot's corrected file leaves; writes the file to a path."""
+    # MuJoCo is loaded only where a file is written
+    from rrru.diagnosis.correction.corrected_model import write_corrected
+
+    masses = Masses(**settings["masses"])
+    return write_corrected(result, settings["robot"]["dimensions"], masses, path, settings["seed"])
+
+
+def facts(settings, result, nominal):
+    """The answer of a Diagnosis as the mapping of `verdict.json`; nominal: the robot as measured."""
+    return answer(settings["campaign"], result.verdict, result.tables, drive_words(nominal))
+
+
+def frames_of(settings, result):
+    """Frames of a Diagnosis by table name, with the campaign's name."""
+    frames = {"gap_verdicts": pd.DataFrame([result.verdict]), **result.tables}
+    keys = {table.name: table.key for table in TABLES}
+    return {
+        name: frame.assign(campaign=settings["campaign"]) if "campaign" in keys[name] else frame
+        for name, frame in frames.items()
+    }
+
+
+def write(settings, result, nominal, paths):
+    """Write verdict, tables and figures of a Diagnosis to paths by name; nominal: the robot as measured."""
+    json_files.write(facts(settings, result, nominal), paths["verdict"])
+    frames = frames_of(settings, result)
+    tables.write_all(tables_of(nominal), frames, paths)
+    draw_all(settings["figures"], {name: paths[name] for name in frames}, figure_options(settings, nominal), paths)
+
+
+def figure_options(settings, nominal):
+    """Options of the figures of a diagnosis; nominal: the robot as measured."""
+    words = drive_words(nominal)
+    return settings["options"] | {"z_down": nominal.z_down, "drives": words.all_names, "drive_noun": words.noun}

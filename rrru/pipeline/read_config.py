@@ -1,0 +1,44 @@
+"""Configurations from YAML files: the package's defaults with overlays on top."""
+
+from pathlib import Path
+
+import yaml
+
+from rrru.errors import ConfigError
+from rrru.pipeline.checks import check_keys, check_schema
+
+DEFAULTS = Path(__file__).with_name("defaults.yaml")
+SCHEMA = Path(__file__).with_name("config.schema.yaml")
+
+
+def read_config(overlays=()):
+    """The defaults of the package under overlays, paths of YAML files, and checked.
+
+    Raises ConfigError for a file that is not a YAML mapping, a key that occurs twice, and an unknown or wrong value.
+    """
+    config = {}
+    check_keys(overlays)
+    for file in (DEFAULTS, *overlays):
+        try:
+            section = yaml.safe_load(Path(file).read_text(encoding="utf-8"))
+        except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+            raise ConfigError(f"{file}: {' '.join(str(error).split())}; allowed: a YAML file") from error
+        if not isinstance(section, dict):
+            raise ConfigError(f"{file} holds {type(section).__name__}; allowed: a mapping of sections")
+        config = merged(config, section)
+    check_config(config)
+    return config
+
+
+def check_config(config):
+    """Raise ConfigError with place and value where a configuration, or some sections of one, has a wrong value."""
+    check_schema(config, SCHEMA, parts=True)
+
+
+def merged(below, above):
+    """A mapping with the entries of another one on top."""
+    both = {
+        key: merged(below[key], value) if isinstance(value, dict) and isinstance(below.get(key), dict) else value
+        for key, value in above.items()
+    }
+    return below | both
