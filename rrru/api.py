@@ -330,7 +330,8 @@ def load_robot(
 
     >>> load_robot("rrru3")
     RobotModel('rrru3', drives: theta1_rad, theta2_rad, theta3_rad)
-    >>> load_robot({"dh": [{"d_mm": 300.0, "alpha_deg": 90.0}, {"a_mm": 400.0}]}, name="two_links").drives
+    >>> whole_turn = {"range_deg": [-180, 180]}
+    >>> load_robot({"dh": [{"a_mm": 300.0, **whole_turn}, {"a_mm": 200.0, **whole_turn}]}, name="planar").drives
     ('q1_rad', 'q2_rad')
     """
     stated = {"tip": tip, "base": base, "tips": tips, "carries": carries, "home": home, "platform": platform}

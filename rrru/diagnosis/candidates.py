@@ -85,8 +85,7 @@ class Candidates:
         gram, across, moment, problem, scale = self._evidence.remaining_columns(terms, prior_scales, level)
         if problem is None:
             return gram, moment, across
-        shared = gram[problem.index] - across[problem.index] @ across.T
-        shared = shared if problem.mix is None else problem.mix.T @ shared
+        shared = problem.of_coefficients(gram[problem.index] - across[problem.index] @ across.T)
         factor = np.linalg.cholesky(scale[:, None] * problem.gram[0] * scale + np.eye(len(scale)))
         half = solve_triangular(factor, scale[:, None] * shared, lower=True, check_finite=False)
         moment = moment - posterior_mean(problem, scale) @ shared

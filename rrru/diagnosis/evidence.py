@@ -365,7 +365,7 @@ class ModelEvidence:
             )
             found = mean_over_cases(problem, np.delete(prior_scales, broad)[None])
         gram, moment, _ = self._whitened.gram(level)
-        others = found if problem is None or problem.mix is None else problem.mix @ found
+        others = found if problem is None else problem.of_columns(found)
         of_broad = averaged_mean(gram, moment, prior.index, prior.at(prior_scales[broad]), index, others)
         before = sum(len(self._prior(term).index) for term in terms[:broad])
         return np.concatenate([found[:before], of_broad, found[before:]])

@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg import solve_triangular
+from scipy.linalg.lapack import dposv
 from scipy.optimize import nnls
 
 from rrru.diagnosis import evidence_kernels as kernels
@@ -35,8 +36,9 @@ class MarginalProblem:
 
     Those of the terms come first, then those of their shapes, last those of payload and tilt, both without owner. gram
     (levels, k, k), moment (levels, k); size, largest, positive, about (k,): of the prior; owner (k,): number of the
-    term, the terms' count without one; index (r,): of the columns; mix (r, k): what makes the coefficients' columns of
-    these, None where they are the same; weights: of each coefficient of payload and tilt whether it is a tilt, no
+    term, the terms' count without one; index (r,): of the columns, those of terms and shapes first, each of one
+    coefficient; mix (s, q): what makes the columns of q coefficients of payload and tilt of the last s, None without
+    these; weights: of each coefficient of payload and tilt whether it is a tilt, no
     mass; and at_least (terms,): prior scales under which the terms are as large as found.
     """
 
@@ -66,17 +68,35 @@ class MarginalProblem:
         """The problem on other Gram matrices (levels, r, r) and moments (levels, r) of its columns."""
         if self.mix is None:
             return replace(self, gram=grams, moment=moments)
-        return replace(self, gram=self.mix.T @ grams @ self.mix, moment=moments @ self.mix)
+        f = len(self.index) - len(self.mix)
+        across = grams[:, :f, f:] @ self.mix
+        of_nuisance = self.mix.T @ grams[:, f:, f:] @ self.mix
+        gram = np.block([[grams[:, :f, :f], across], [across.transpose(0, 2, 1), of_nuisance]])
+        return replace(self, gram=gram, moment=np.concatenate([moments[:, :f], moments[:, f:] @ self.mix], axis=1))
+
+    def of_columns(self, coefficients):
+        """Coefficients (r,) of the columns from those of the problem (k,)."""
+        if self.mix is None:
+            return coefficients
+        f = len(self.index) - len(self.mix)
+        return np.concatenate([coefficients[:f], self.mix @ coefficients[f:]])
+
+    def of_coefficients(self, rows):
+        """Rows (k, n) of the coefficients' columns from those of the columns (r, n)."""
+        if self.mix is None:
+            return rows
+        f = len(self.index) - len(self.mix)
+        return np.concatenate([rows[:f], self.mix.T @ rows[f:]])
 
     def reordered(self, terms, coefficients):
         """The problem with terms (terms,), and coefficients (k,) of these and of shapes, in an order of old numbers."""
         k = np.concatenate([coefficients, np.arange(len(coefficients), len(self.size))])
         rank = np.append(np.argsort(terms), len(terms))
         arrays = {name: getattr(self, name)[k] for name in ("size", "largest", "positive", "about")}
-        columns = {"index": self.index[k]} if self.mix is None else {"mix": self.mix[:, k]}
+        index = np.concatenate([self.index[coefficients], self.index[len(coefficients) :]])
         at_least = None if self.at_least is None else self.at_least[terms]
         gram, moment, owner = self.gram[:, k[:, None], k], self.moment[:, k], rank[self.owner[k]]
-        return replace(self, gram=gram, moment=moment, owner=owner, at_least=at_least, **arrays, **columns)
+        return replace(self, gram=gram, moment=moment, owner=owner, at_least=at_least, index=index, **arrays)
 
     def scale(self, prior_scales):
         """Prior standard deviations (m, k) at prior_scales (m, terms)."""
@@ -113,7 +133,7 @@ def posterior_mean(problem, scale):
     gram, about, positive = problem.gram[0], problem.about, problem.positive
     precision = _precision(gram, scale)
     moment = scale * (problem.moment[0] - gram @ about)
-    mean = np.linalg.solve(precision, moment)
+    mean = _solved(precision, moment)
     if (mean[positive] < 0.0).any():
         mean = _not_negative(precision, moment, positive)
     return about + scale * mean
@@ -129,11 +149,21 @@ def _precision(gram, scale):
     return scale[:, None] * gram * scale + np.eye(len(scale))
 
 
+def _solved(precision, moment):
+    """Solution (k,) or (k, n) of a symmetric positive definite system; half the work of a general one."""
+    if not len(precision):
+        return moment
+    _, solution, info = dposv(precision.T, moment, lower=True)
+    if info:
+        raise np.linalg.LinAlgError(f"precision of the coefficients is not positive definite (row {info})")
+    return solution
+
+
 def _not_negative(precision, moment, positive):
     """The most probable point (k,) without negative positive coefficients, the others found from these."""
     free = ~positive
     both = np.column_stack([precision[free][:, positive], moment[free]])
-    taken = np.linalg.solve(precision[free][:, free], both)
+    taken = _solved(precision[free][:, free], both)
     left = np.column_stack([precision[positive][:, positive], moment[positive]]) - both[:, :-1].T @ taken
     factor = np.linalg.cholesky(left[:, :-1])
     result = np.empty(len(moment))

@@ -77,12 +77,10 @@ def with_nuisance(problem, count, blocks, steps, found, grams):
     means = np.array([step[-1] for step in steps])
     acting = {k: matrix @ found[problem.owner == k] for k, (matrix, _) in blocks.items()}
     index = np.concatenate([numbers.ravel() for _, numbers in blocks.values()])
-    mix = np.zeros((len(found) + len(index), len(found) + len(means)))
-    np.fill_diagonal(mix[: len(found)], 1.0)
-    row = len(found)
+    mix, row = np.zeros((len(index), len(means))), 0
     for coordinates in acting.values():
         for number in range(len(means)):
-            mix[row : row + len(coordinates), len(found) + number] = coordinates
+            mix[row : row + len(coordinates), number] = coordinates
             row += len(coordinates)
     more = {
         "size": np.ones(len(means)),

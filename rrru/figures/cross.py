@@ -23,7 +23,9 @@ def cross(tables, options):
     before = summary[summary["mode"] == "before"].assign(calibration="before")
     after = summary[(summary["mode"] == mode) & (summary["method"] == options["method"])]
     rows = ["before", *dict.fromkeys(after["calibration"])]
-    present = [name for name in summary["trajectory"].unique() if name not in _NOT_SHOWN]
+    named = [name for name in summary["trajectory"].unique() if name not in _NOT_SHOWN]
+    # the only trajectory of a list of a tracker's has that name
+    present = named or list(summary["trajectory"].unique())
     single = sorted((name for name in present if name not in _GROUPS), key=choose.natural)
     columns = [*single, *(name for name in _GROUPS if name in present)]
     shown = pd.concat([before, after]).drop_duplicates(["calibration", "trajectory"], keep="last")

@@ -310,6 +310,14 @@ def test_odd_campaigns_are_drawn_too(case, name):
         ]
 
 
+def test_the_only_trajectory_of_a_tracker_s_list_is_shown():
+    """It is called `all`, as the sum over several trajectories is."""
+    frames = synthetic.all_tables()
+    summary = frames["error_summary"].query("trajectory == 'all'")
+    texts = [text.get_text() for text in draw("cross", {"error_summary": summary}).axes[0].get_xticklabels()]
+    assert texts == [choose.plain("all")]
+
+
 def test_a_sweep_without_visible_scatter_and_one_slice_are_drawn_too(frames):
     flat = frames | synthetic.sweeps(scatter_mm=0.0)
     draw("fig06", flat).draw_without_rendering()

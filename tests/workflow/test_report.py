@@ -8,6 +8,8 @@ import pandas as pd
 import pytest
 import yaml
 
+import rrru
+from rrru.pipeline.read_config import read_config
 from rrru.report import page
 from tests.places import ROOT
 from tests.workflow.browser import chromium, open_page, requested
@@ -152,3 +154,16 @@ def test_the_page_of_one_campaign_takes_the_jobs_of_that_campaign_alone(shared):
     target = "build/minimal/campaigns/field_09/report.html"
     code, output = dry_run(shared, target, overlays=(MINIMAL, "field.yaml"))
     assert code == 0 and re.search(r"total +1\n", output), output
+
+
+def test_the_library_writes_the_same_bytes_for_a_campaign(shared, tmp_path, monkeypatch):
+    monkeypatch.chdir(shared)
+    config = read_config(["config.yaml", MINIMAL, "field.yaml"])
+    written = rrru.diagnose(rrru.configured_campaign("field_09", config)).write(tmp_path)
+    made = shared / "build/minimal"
+    for place in ("campaigns/field_09", "figures/field_09"):
+        names = {path.name for path in (tmp_path / place).iterdir()}
+        assert names == {path.name for path in (made / place).iterdir()}
+        for name in names:
+            assert (tmp_path / place / name).read_bytes() == (made / place / name).read_bytes(), name
+    assert written.parent == tmp_path / "campaigns/field_09"

@@ -1,0 +1,111 @@
+"""The command: its answer, its exit codes, and one message without a traceback for whatever is wrong."""
+
+import json
+import re
+import subprocess
+import sys
+from dataclasses import replace
+
+import pytest
+import yaml
+
+import rrru
+from rrru import cli
+from rrru.studies.blind_validation.sentences.mistakes import MISTAKES, shows, with_mistake
+from tests.places import ROOT
+
+SEED, STOPS = 11, 90
+
+
+@pytest.fixture(autouse=True)
+def _in_the_project(monkeypatch):
+    monkeypatch.chdir(ROOT)
+
+
+def ran(capsys, *arguments):
+    """Exit code, output and messages of the command."""
+    code = cli.main([str(one) for one in arguments])
+    return code, *capsys.readouterr()
+
+
+def test_it_runs_as_a_command_of_its_own_in_any_folder(tmp_path):
+    code = "import sys; from rrru.cli import main; sys.exit(main())"
+    ended = subprocess.run([sys.executable, "-c", code, "--version"], capture_output=True, text=True, cwd=tmp_path)
+    assert (ended.returncode, ended.stdout.strip()) == (0, f"rrru {rrru.__version__}")
+    ended = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=tmp_path)
+    assert ended.returncode == cli.WRONG and "usage: rrru" in ended.stderr
+
+
+def test_a_diagnosis_prints_its_answer_and_where_its_files_are(tmp_path, capsys):
+    arguments = ("data/field_12.csv", "--robot", "rrru3", "--noise", "0.02", "--set", "platform_mass_kg=3.0")
+    code, out, _ = ran(capsys, "diagnose", *arguments, "--out", tmp_path)
+    folder = tmp_path / "campaigns/field_12"
+    facts = json.loads((folder / "verdict.json").read_text())
+    said = " ".join(out.split())
+    assert code == cli.DONE and all(" ".join(sentence.split()) in said for sentence in facts["sentences"])
+    assert f"page: {folder / 'report.html'}" in out and (folder / "report.html").is_file() and "\033" not in out
+    code, out, _ = ran(capsys, "diagnose", *arguments, "--out", tmp_path, "--json")
+    assert code == cli.DONE and json.loads(out) == facts
+
+
+def test_robots_and_effects_are_listed(capsys):
+    code, out, _ = ran(capsys, "robots")
+    assert code == cli.DONE and [line.split(":")[0] for line in out.splitlines()] == ["rrru3", "ptt3", "delta"]
+    code, out, _ = ran(capsys, "effects", "--robot", "data/models/arm6.urdf")
+    assert code == cli.DONE and "drive_compliance: " in out and "rail_tilt" not in out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "said"),
+    [
+        (("diagnose", "nothere.csv", "--robot", "rrru3"), cli.WRONG, "there is no file nothere.csv"),
+        (("diagnose", "data/field_12.csv"), cli.WRONG, "no robot is stated"),
+        (("diagnose", "data/field_12.csv", "--robot", "x.urdf"), cli.WRONG, "robot 'x.urdf': there is no such file"),
+        (("diagnose", "README.md", "--robot", "rrru3"), cli.REFUSED, "README.md"),
+        (("diagnose", "data/field_12.csv", "--robot", "rrru3", "--noise", "-1"), cli.WRONG, "noise_mm: -1.0"),
+        (("diagnose", "data/field_12.csv", "--robot", "rrru3", "--set", "unit"), cli.WRONG, "no =; allowed: KEY=VALUE"),
+        (("diagnose", "data/field_12.csv", "--robot", "rrru3", "--set", "unit=cm"), cli.WRONG, "'cm' is not one of"),
+        (("diagnose", "data/field_12.csv", "--robot", "rrru3", "--target", "a=1,2"), cli.WRONG, "NAME=X,Y,Z"),
+        (("diagnose", "data/field_12.csv", "--robot", "rrru3", "--effects", "ghosts"), cli.WRONG, "unknown effect"),
+        (("diagnose", "paper", "--config", "config.yaml"), cli.WRONG, "virtual one"),
+        (("check", "paper", "--config", "config.yaml"), cli.WRONG, "virtual one"),
+        (("compare", "nothing", "nobody"), cli.WRONG, "'nothing' is no folder"),
+        (("printer", "nothere.cfg"), cli.REFUSED, "nothere.cfg"),
+        (("robots", "--config", "nothere.yaml"), cli.WRONG, "nothere.yaml"),
+        (("effects", "--robot", "nobody"), cli.WRONG, "robot 'nobody'"),
+    ],
+)
+def test_what_is_wrong_gets_one_message_and_its_exit_code(arguments, code, said, capsys, tmp_path):
+    out = ("--out", tmp_path / "results") if arguments[0] == "diagnose" else ()
+    found, printed, message = ran(capsys, *arguments, *out)
+    assert found == code and said in message and message.startswith("error: ") and "Traceback" not in message
+    assert not printed and not (tmp_path / "results").exists()
+
+
+@pytest.mark.parametrize("number", range(len(MISTAKES)), ids=list(MISTAKES))
+def test_a_gross_mistake_in_a_file_gets_one_message(number, tmp_path, capsys):
+    name, own, handed = with_mistake(number, SEED, STOPS)
+    if not shows(name, own, handed):
+        pytest.skip("it does not show in this file")
+    replace(own, nominal=handed.nominal).write(tmp_path, handed.rows, "stops.csv")
+    robot = handed.nominal.section(str(tmp_path / own.robot_file), own.kind)
+    section = handed.section | {"ingest": str(tmp_path / "stops.csv")}
+    (tmp_path / "mine.yaml").write_text(yaml.safe_dump({"robots": {"own": robot}, "campaigns": {"stops": section}}))
+    arguments = ("stops", "--config", tmp_path / "mine.yaml")
+    code, out, message = ran(capsys, "diagnose", *arguments, "--out", tmp_path / "results")
+    assert code == cli.REFUSED and not out and message.startswith("error: ") and "Traceback" not in message
+    code, out, message = ran(capsys, "check", *arguments)
+    # units and frame are proposed, the rest is refused; either way the key to write is there
+    assert (code == cli.REFUSED) == ("refused: " in out) and not message
+    assert all(re.search(words, out, re.DOTALL) for words in handed.words)
+
+
+def test_a_failure_of_the_program_says_how_to_see_more(monkeypatch, capsys):
+    def fails(_):
+        raise ZeroDivisionError("in the middle")
+
+    monkeypatch.setattr(cli, "_robots", fails)
+    code, _, message = ran(capsys, "robots")
+    assert code == cli.FAILED and "ZeroDivisionError: in the middle; run it again with --debug" in message
+    with pytest.raises(ZeroDivisionError):
+        cli.main(["robots", "--debug"])
