@@ -128,6 +128,8 @@ def _refuse_gross_error(sheet: Sheet, unit_stated: bool) -> list[str]:
         _refuse(sheet, gross, driven)
     if contradiction is None:
         return []
+    if not np.isfinite(contradiction.off_mm):
+        return [f"the nominal robot has too few poses at the {sheet.drive_name} to compare the commanded positions"]
     off = f"commanded positions {contradiction.off_mm:.3g} mm in the median from those of the nominal robot at the "
     off += sheet.drive_name
     if contradiction.refused:
