@@ -102,8 +102,10 @@ def readable(name):
 
 
 def rounded(value, digits=2):
-    """A number to some significant digits, without an exponent."""
-    if not (value and np.isfinite(value)):
+    """A number to some significant digits, without an exponent; "unknown" for None and what is not finite."""
+    if value is None or not np.isfinite(value):
+        return "unknown"
+    if value == 0.0:
         return "0"
     places = digits - 1 - int(np.floor(np.log10(abs(value))))
     return f"{round(value, places):.{max(places, 0)}f}"

@@ -2,6 +2,8 @@
 
 import shutil
 
+import numpy as np
+import pandas as pd
 import pytest
 from markupsafe import escape
 
@@ -72,6 +74,22 @@ def test_errors_of_a_corrected_file_are_next_to_its_link(folder):
     worth = text.index("It is 0.31 mm rms off the diagnosed robot at the measured poses, 0.54 mm at 200 fresh ones.")
     assert link < worth < text.index(remains[1:]) and f'<p class="lead">{remains[:10]}' not in text
     assert '<p class="lead">After calibration' in text
+
+
+def test_a_corrected_file_without_fresh_poses_says_so(folder):
+    text = _with_file(folder, file_error_mm=0.31, file_error_fresh_mm=np.nan)
+    said = "It is 0.31 mm rms off the diagnosed robot at the measured poses, at the fresh ones it has no pose."
+    assert said in text
+
+
+def test_corrected_drive_values_are_linked_where_there_are_any(folder):
+    place = folder / "campaigns" / CAMPAIGN / "corrected_drives.parquet"
+    pd.DataFrame({"point": []}).to_parquet(place)
+    assert "corrected_drives" not in _with_file(folder)
+    pd.DataFrame({"point": [1]}).to_parquet(place)
+    assert f'<a href="campaigns/{CAMPAIGN}/corrected_drives.parquet">corrected_drives</a>' in _with_file(folder)
+    unsure = _with_file(folder, effects="unexplained", no_answer="no", not_in_model="not corrected: no")
+    assert "corrected_drives.parquet" not in unsure
 
 
 def test_a_corrected_file_that_is_worse_than_the_calibration_is_the_headline(folder):

@@ -270,7 +270,10 @@ def test_a_file_that_is_no_better_than_the_one_that_came_is_not_offered(attached
 
 def test_what_a_corrected_file_leaves_beyond_the_diagnosis_is_said(arm, hexapod, attached):
     verdict = arm.found.verdict
-    left = float(re.search(r": (\S+) mm rms remain; use corrected_drives$", verdict["file_remainder"])[1])
+    speeds = arm.frame["speed_mm_s"]
+    loads = f"payload 0 kg, speed {speeds.min():.3g}( to {speeds.max():.3g})? mm/s, temperature unknown"
+    held = rf": (\S+) mm rms remain at poses and loads like those measured \({loads}\); use corrected_drives$"
+    left = float(re.search(held, verdict["file_remainder"])[1])
     assert verdict["file_remainder"].startswith(
         "this URDF holds the geometry only and not encoder eccentricity, backlash:"
     )
