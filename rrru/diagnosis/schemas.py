@@ -84,7 +84,9 @@ share_high             float  upper end, 95 %, from the posterior
 probability            float? that the part is real; null where that is no question, or where no noise is stated
 
 ## gap_locate | tables/gap_locate.parquet | campaign factor level
-Where the gap is largest: its variance by factor, split over the levels of each factor.
+Where the gap is largest: its variance by factor, split over the levels of each factor. The factor drive expresses each
+residual as errors of all drives together. Drives that move the point alike share these: their rms_mm do not add up to
+the gap, and the largest share does not name the drive at fault.
 --
 campaign
 factor                 str    what the points are split by {trajectory, region, direction, drive, motion_direction,

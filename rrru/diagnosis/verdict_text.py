@@ -30,7 +30,7 @@ _CHECK = (
 NOT_CORRECTED = "not corrected: "
 _WORDS = DriveWords()
 # units of sentences for those of tables, and the factor: without rows of zeros
-_READABLE = {"1": ("", 1.0), "rad/(N mm)": ("mrad/(N m)", 1e6), "mm/(N mm)": ("µm/(N m)", 1e6)}
+_READABLE = {"1": ("", 1.0), "rad/(N mm)": ("µrad/(N m)", 1e9), "mm/(N mm)": ("µm/(N m)", 1e6)}
 _READABLE |= {"mm/N": ("µm/N", 1e3), "1/K": ("µm/(m K)", 1e6), "mm/s": ("µm/s", 1e3), "rad/s": ("µrad/s", 1e6)}
 _LIMITED = (NO_PAYLOAD, WITHIN_LIMITS)
 _UNSURE = "No cause is probable enough to be named; the most probable answer follows."

@@ -276,6 +276,18 @@ def test_a_rounded_number_is_off_by_half_a_digit_at_most(value, digits):
     assert "e" not in text
 
 
+@pytest.mark.parametrize("value", [None, np.nan, np.inf])
+def test_a_size_that_is_not_known_is_not_zero(value):
+    assert verdict_text.rounded(value) == "unknown" and verdict_text.rounded(0.0) == "0"
+
+
+def test_compliances_of_joints_are_in_microradians_per_newton_metre():
+    """6.67e-9 rad/(N mm) = 6.67e-6 rad/(N m)."""
+    row = {"parameter": "compliance2", "unit": "rad/(N mm)", "value": 6.67e-9, "standard_error": 6e-11}
+    (size,) = verdict_text._sizes([row | {"low_95": 6.55e-9, "high_95": 6.79e-9}])
+    assert size == "compliance2 = 6.67 µrad/(N m) (95 %: 6.55 to 6.79)"
+
+
 @given(st.floats(-1e3, 1e3), st.floats(1e-7, 1e2))
 def test_a_number_with_its_interval_is_given_to_two_digits_of_the_half_width(value, half):
     text = verdict_text.with_interval(value, value - half, value + half, "mm")

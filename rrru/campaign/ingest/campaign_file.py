@@ -65,11 +65,12 @@ def ingest(spec: IngestSpec, mechanism: Robot) -> Ingested:
         sheet = replace(sheet, frame=sheet.frame.assign(**moved))
         check_measured(at_tool(sheet, mounted), lambda: "rows that belong to each other")
         sheet.problems.refuse()
-        zeros = ", with the zeros of the drives that were found" if mounted and mounted.zeros_lost else ""
-        residual = f"residual {registration.rms_mm:.4g} mm rms, {registration.max_mm:.4g} mm at most{zeros}"
+        zeros = " and with the zeros of the drives that were found" if mounted and mounted.zeros_lost else ""
+        left = f"{registration.rms_mm:.4g} mm rms, {registration.max_mm:.4g} mm at most"
         notes += [
-            f"measured positions registered to the commanded ones at {registration.points} points: {residual}; the "
-            "remaining rigid motion is fitted with the calibration"
+            f"measured positions registered to the commanded ones at {registration.points} points: distance in space "
+            f"after registration{zeros} {left}, errors of the robot's geometry included; the calibration fits these "
+            "and the remaining rigid motion"
         ]
     if not (mounted and mounted.zeros_lost):
         notes += _large_error_notes(sheet)
