@@ -21,6 +21,8 @@ _AT_POSES = {"translational_measure": "position Jacobian", "constraint_measure":
 _VIEWS = ("side view", "top view")
 _DOT = {"s": 11.0, "edgecolors": "#444444", "linewidths": 0.25}
 _NEAR_POSE = {**_NEAR, "markersize": 6.0, "markerfacecolor": "none"}
+_OF_LOOPS = "smallest singular value of the legs' unit wrenches, 0 at a singularity"
+_BAR_PLACE = {"location": "bottom", "aspect": 60, "fraction": 0.03, "spacing": "uniform"}
 _BAR = "smallest / largest singular value of the position Jacobian, 0 at a singularity"
 # a constraint measure above this is 1 up to rounding; heights of a view over its width
 _NO_LOOP, _LOWEST, _HIGHEST = 1.0 - 1e-6, 0.35, 1.1
@@ -60,8 +62,7 @@ def workspace(tables, options):
             style.height_axis(row[0], bool(facts["z_down"]))
         else:
             row[0].set_ylabel(f"{grid.up} (mm)")
-    place = {"location": "bottom", "aspect": 60, "fraction": 0.03, "spacing": "uniform"}
-    bar = figure.colorbar(image, ax=list(panels.ravel()), **place)
+    bar = figure.colorbar(image, ax=list(panels.ravel()), **_BAR_PLACE)
     bar.set_label("singularity measure: 0 at a singularity, 1 at best")
     figure.legend(handles=_legend(points), loc="outside upper center", ncols=3, columnspacing=1.4)
     return figure
@@ -90,12 +91,10 @@ def _at_poses(points, z_down):
             axes.plot(near[f"command_{across}_mm"], near[f"command_{up}_mm"], **_NEAR_POSE)
             axes.set_title(f"({next(marks)}) {meaning}, {view}")
             axes.set(xlabel=f"{across} (mm)", ylabel=f"{up} (mm)", aspect="equal")
-            axes.set_adjustable("datalim")
+            axes.margins(0.06)
         style.height_axis(row[0], z_down)
-    bar = figure.colorbar(
-        image, ax=list(panels.ravel()), location="bottom", aspect=60, fraction=0.03, spacing="uniform"
-    )
-    bar.set_label(_BAR + (", (c, d) smallest singular value of the legs' wrenches" if closed else ""))
+    bar = figure.colorbar(image, ax=list(panels.ravel()), **_BAR_PLACE)
+    bar.set_label(f"(a, b) {_BAR}\n(c, d) {_OF_LOOPS}" if closed else _BAR)
     if (points["status"] == "near_singularity").any():
         handle = Line2D([], [], label="commanded pose near a singularity", **_NEAR_POSE)
         figure.legend(handles=[handle], loc="outside upper center")
