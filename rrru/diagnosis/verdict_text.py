@@ -216,14 +216,14 @@ def _causes(facts):
     said = [_by_share(facts, groups, len(small))] if with_shares and len(facts["effects"]) > 1 else []
     said = ([_UNSURE] if any(effect["decision"] == POSSIBLE for effect in single) else []) + said
     single = [effect for effect in single if effect["name"] not in small]
-    said += [_cause(effect, "" if number else " of that", with_shares) for number, effect in enumerate(single)]
+    said += [_cause(effect, "" if number else " of the gap", with_shares) for number, effect in enumerate(single)]
     said += [_of_group(group, with_shares) for group in groups.values()]
     if not with_shares and said:
         small = facts["gap_rms_mm"] <= facts["noise_rms_mm"]
         why = "The gap is too small relative to the noise" if small else "The effects are confounded with each other"
         said.append(f"{why}: their shares of the gap cannot be determined.")
     elif _overlap(facts):
-        said.append("These shares overlap: parts of the effects are correlated at these points.")
+        said.append("These shares add up to more than the gap: parts of the effects cancel each other at these points.")
     if facts["unexplained"]:
         share = share_with_interval(next(part for part in facts["budget"] if part["kind"] == "unexplained"))
         if said:
@@ -385,7 +385,7 @@ def _open(facts):
     listed += [f"that {readable(name)} does not act" for name in named if name in uncertain]
     if not listed:
         return []
-    first = "Parts of it could be" if facts["unexplained"] else "These data cannot rule out"
+    first = "Parts of the unexplained share could be" if facts["unexplained"] else "These data cannot rule out"
     return [f"{first}: {', '.join(listed)}."]
 
 
@@ -407,7 +407,8 @@ def _next(facts):
     if said:
         return said
     if facts["unexplained"]:
-        return ["Next: no run is advised, since no effect model fits; gap_locate says where the gap is largest."]
+        where = "gap_locate says where the gap is largest"
+        return [f"Next: no run is advised, since no effect model fits the unexplained part; {where}."]
     decided = not (facts["groups"] or facts["confusable_with"])
     least = min((effect["probability"] for effect in facts["effects"]), default=facts["probability"])
     if max(least if decided else 0.0, facts["probability"]) >= OPTIONS.min_sure_probability:

@@ -77,7 +77,7 @@ def test_the_sentences_say_what_acts_how_much_how_sure_and_what_next():
     said = " ".join(answered(runs=(RUN,))["sentences"])
     for words in (
         "the residual error is 0.37 mm at points left out of it (noise subtracted)",
-        "60 % of that (95 %: 48 % to 78 %) is link flexure in leg 2, ",
+        "60 % of the gap (95 %: 48 % to 78 %) is link flexure in leg 2, ",
         "flexure2 = 1.23 µm/N (95 %: 1.01 to 1.45): ",
         "20 % (95 %: 16 % to 26 %) is backlash, width1 = width2 = 0.000404 rad (95 %: 0.000365 to 0.000443): backlash ",
         "backlash between motor and drive arm.",
@@ -105,7 +105,7 @@ def test_shares_overlap_only_where_there_are_several(shares, overlap):
         budget.loc[budget["part"] == name, "share"] = share or 0.0
     effects = "link_flexure+backlash" if shares[1] else "link_flexure"
     said = " ".join(answered(budget=budget, effects=effects)["sentences"])
-    assert ("These shares overlap" in said) == overlap
+    assert ("These shares add up to more than the gap" in said) == overlap
 
 
 def test_confounded_causes_are_one_sentence_with_their_probabilities():
@@ -266,7 +266,7 @@ def test_where_nothing_acts_or_the_library_lacks_it_no_effect_is_blamed():
         "no effect of the library explains it: 5 % (95 %: 4 % to 6 %) of it" in unknown
         and " is backlash" not in unknown
     )
-    assert "Parts of it could be: drive compliance." in unknown
+    assert "Parts of the unexplained share could be: drive compliance." in unknown
 
 
 @given(st.floats(1e-7, 1e6), st.integers(1, 5))

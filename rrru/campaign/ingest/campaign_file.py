@@ -69,8 +69,8 @@ def ingest(spec: IngestSpec, mechanism: Robot) -> Ingested:
         left = f"{registration.rms_mm:.4g} mm rms, {registration.max_mm:.4g} mm at most"
         notes += [
             f"measured positions registered to the commanded ones at {registration.points} points: distance in space "
-            f"after registration{zeros} {left}, errors of the robot's geometry included; the calibration fits these "
-            "and the remaining rigid motion"
+            f"after registration{zeros} {left}, errors of the robot's geometry included, which the calibration "
+            "fits with the remaining rigid motion"
         ]
     if not (mounted and mounted.zeros_lost):
         notes += _large_error_notes(sheet)

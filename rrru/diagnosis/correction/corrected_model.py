@@ -155,7 +155,7 @@ def gap_rows(inference, corrected, section, file, shrink):
             for (_, robot, _), one in zip(models, files, strict=True)
         ]
     except (ConfigError, SimulationError, UnreachableError) as error:
-        why = f"corrected model not driven: {error}; closed at its drive values instead"
+        why = f"corrected model not driven, but closed at its drive values, since {error}"
         poses = [_closed(inference.case, robot, effects) for _, robot, effects in models]
     result, case = [], inference.case
     known = case.on_robot & case.complete({term.effect for term in inference.fit.terms})

@@ -132,7 +132,9 @@ def test_what_a_urdf_cannot_hold_is_named_and_left_in_its_gap(arm):
     verdict = arm.found.verdict
     assert set(verdict["effects"].split("+")) == {"backlash", "encoder_eccentricity"}
     assert verdict["not_in_model"].startswith("encoder_eccentricity; backlash of axis1")
-    assert "corrected model not driven: a URDF has no actuators" in verdict["notes"]
+    assert (
+        "corrected model not driven, but closed at its drive values, since a URDF has no actuators" in verdict["notes"]
+    )
     after, resimulated = _rows(arm, "corrected_model"), _rows(arm, "resimulated")
     assert resimulated["rms_mm"] < 1.2 * np.sqrt(3.0) * _NOISE_MM
     assert 3.0 * resimulated["rms_mm"] < after["rms_mm"] < _rows(arm, "given_model")["rms_mm"]

@@ -289,7 +289,7 @@ def _page(sentences=(), notes=(), read=()):
 
 def test_sentences_have_distinct_kinds():
     cause = (
-        "74 % of that (95 %: 60 % to 80 %) is encoder eccentricity at q3, amplitude3 = 0.000176 rad (95 %: 0.000148 "
+        "74 % of the gap (95 %: 60 % to 80 %) is encoder eccentricity at q3, amplitude3 = 0.000176 rad (95 %: 0.000148 "
         "to 0.000204), phase3 = phase4 = -0.59 rad (95 %: -0.79 to -0.39): the encoder's disc sits off its shaft's "
         "centre. It is largest for q3 at 30.0 degrees: 0.0002 rad (95 %: 0.0001 to 0.0003) off its mean over the "
         "measured range."
