@@ -129,7 +129,7 @@ group_probability      float? that one of its group is at work; null where it is
 legs                   str    on each leg its own value, one value on all (same), or the one leg; empty where legs
     make no difference
 log_evidence           float? of the best hypothesis with this effect over none, natural logarithm
-heldout_gain           float? log predictive score gained on left-out runs by adding it to the calibration
+heldout_gain           float? log predictive score gained at left-out points by adding it to the calibration
 heldout_gain_low       float? lower end, 95 %, from the folds; null where there is one
 heldout_gain_high      float? upper end, 95 %
 note                   str    empty where there is nothing to say
@@ -165,8 +165,8 @@ step                   int    0: calibration alone
 added                  str    effect added at this step; empty at 0
 effects                str    all effects so far, joined by +, or none
 trajectory             str    trajectory, * for all
-kind                   str    held_out: on runs that were not fitted on; resimulated: fitted on all runs, through the
-    full spatial closure; given_model, corrected_model: the robot's file as it came, and as it is written back, on all
+kind                   str    held_out: at points that the fit has not used; resimulated: fitted on all runs, through
+    the full spatial closure; given_model, corrected_model: the robot's file as it came, and as it is written back, on all
     runs {held_out, resimulated, given_model, corrected_model}
 points
 rms_mm                 float  measured minus model

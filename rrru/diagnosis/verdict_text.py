@@ -223,7 +223,8 @@ def _causes(facts):
         why = "The gap is too small relative to the noise" if small else "The effects are confounded with each other"
         said.append(f"{why}: their shares of the gap cannot be determined.")
     elif _overlap(facts):
-        said.append("These shares add up to more than the gap: parts of the effects cancel each other at these points.")
+        with_rest = " and of what is unexplained" if facts["unexplained"] else ""
+        said.append(f"These shares add up to more than the gap: parts of the effects{with_rest} cancel each other.")
     if facts["unexplained"]:
         share = share_with_interval(next(part for part in facts["budget"] if part["kind"] == "unexplained"))
         if said:
@@ -369,7 +370,8 @@ def _left(facts):
     """Residual error with the effects in the simulator."""
     after, noise = (rounded(facts[name]) for name in ("gap_after_rms_mm", "noise_rms_mm"))
     what = "it" if len(facts["effects"]) == 1 else "them"
-    return [f"With {what} in the simulator the residual error on left-out runs is {after} mm; the noise is {noise} mm."]
+    size = f"{after} mm; the noise is {noise} mm"
+    return [f"With {what} in the simulator the residual error at left-out points is {size}."]
 
 
 def _open(facts):

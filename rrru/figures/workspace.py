@@ -32,11 +32,11 @@ _FIELDS = (*_MEASURES, "constraint_determinant")
 
 @style.printed
 def workspace(tables, options):
-    """Distance from singularities and the commanded points, projected. Of robots that cannot orient their tool over the
-    reachable workspace: hatched is out of reach; on the line the constraint determinant changes its sign. Of robots
-    that orient it at the commanded poses, since what these reach depends on the orientation: the smallest over the
-    largest singular value of the position Jacobian, angles times the characteristic length, and where legs close loops
-    the constraint measure.
+    """Distance from singularities, and the commanded points, projected. A robot that cannot orient its tool has it over
+    the reachable workspace: hatched is out of reach; on the line the constraint determinant changes its sign. A robot
+    that orients it has it at the commanded poses, since its reach depends on the orientation: the smallest over the
+    largest singular value of the position Jacobian, angles times the characteristic length, and the constraint measure
+    where legs close loops.
     """
     campaign = options["campaign"]
     facts = choose.of_campaign(tables, "campaigns", campaign, "workspace").iloc[0]

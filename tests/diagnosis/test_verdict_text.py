@@ -84,7 +84,7 @@ def test_the_sentences_say_what_acts_how_much_how_sure_and_what_next():
         "Causes by their share of the gap: link flexure 60 %, backlash 20 %.",
         "Probability that it acts: link flexure 0.98, backlash 0.97. Probability of exactly this answer: 0.97.",
         "10 % (95 %: 8 % to 13 %) does not repeat",
-        "With them in the simulator the residual error on left-out runs is 0.020 mm",
+        "With them in the simulator the residual error at left-out points is 0.020 mm",
         "the noise is 0.035 mm",
         "cannot rule out: drive compliance, servo lag.",
         "Next: drive line_1 in reverse. That decides whether servo lag acts.",

@@ -58,7 +58,7 @@ _SENTENCES = {
     rf"answer: {_P}\.",
     "it does not repeat": rf"(?:{_SHARE}|Some of it) does not repeat from pass to pass.*",
     "it is random error": rf"(?:{_SHARE}|Some of it) is random error above the stated noise.*",
-    "what is left with it": rf"With (?:it|them) in the simulator the residual error on left-out runs is {_X} mm; "
+    "what is left with it": rf"With (?:it|them) in the simulator the residual error at left-out points is {_X} mm; "
     rf"the noise is {_Y} mm\.",
     "these data cannot rule out": r"(?:These data cannot rule out|Parts of the unexplained share could be): "
     r"(?P<names>.*)\.",
