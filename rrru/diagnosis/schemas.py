@@ -166,8 +166,8 @@ added                  str    effect added at this step; empty at 0
 effects                str    all effects so far, joined by +, or none
 trajectory             str    trajectory, * for all
 kind                   str    held_out: at points that the fit has not used; resimulated: fitted on all runs, through
-    the full spatial closure; given_model, corrected_model: the robot's file as it came, and as it is written back, on all
-    runs {held_out, resimulated, given_model, corrected_model}
+    the full spatial closure; given_model, corrected_model: the robot's file as it came, and as it is written back, on
+    all runs {held_out, resimulated, given_model, corrected_model}
 points
 rms_mm                 float  measured minus model
 max_mm                 float  largest distance
