@@ -147,7 +147,7 @@ _CASES = [
         ({"name": "a", "place": "60.3, -0.5, ?", "about": "0.4"}, {}, _FACTS),
         ({"name": "a", "place": "60.3, -0.5, 43", "about": "0.4"}, {}, _FACTS),
     ),
-    ("orientations are turned", ({"value": "0.002"}, {}, _FACTS), ({"value": "1.57"}, {}, _FACTS)),
+    ("orientations are turned", ({"value": "0.11"}, {}, _FACTS), ({"value": "90"}, {}, _FACTS)),
     (
         "place of a cause",
         ({"name": "backlash", "place": " at q2"}, {}, _FACTS),
