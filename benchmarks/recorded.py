@@ -17,7 +17,7 @@ ROOT = Path(__file__).resolve().parents[1]
 FILE, PLATFORM, NOISE_MM = ROOT / "data/models/arm6.xml", "tool0", 0.01
 NOMINAL = {"name": "arm6", "dimensions": {"mjcf": str(FILE), "platform": PLATFORM}, "parameter_set": "zero"}
 AXES = [f"axis{k}" for k in range(1, 7)]
-# units of a drive's parameters: mrad, nrad/(N mm), mrad
+# units of a drive's parameters: mrad, µrad/(N m), mrad
 UNIT = {"zero": 1e-3, "soft_servo": 1e-9, "play": 1e-3}
 PASSES = ({}, {"reverse": True}, {"trajectories": ["line_1", "spiral"], "payload_kg": 4.0})
 # slow enough that inertia is negligible for the diagnosis, which uses the plan's times

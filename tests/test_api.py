@@ -90,9 +90,10 @@ def test_a_refused_data_frame_is_named_without_a_path(monkeypatch):
 def test_a_zero_that_is_off_is_found_and_the_corrected_file_holds_it(arm, tmp_path):
     """Truth from the arm's kinematics alone: the zero of joint 2 within its interval, the file as good as the noise."""
     generator = np.random.default_rng(4)
-    campaign = rrru.read_campaign(_measured(arm, generator), arm, noise_mm=NOISE_MM, motion="stop_and_go")
+    stated = {"noise_mm": NOISE_MM, "motion": "stop_and_go", "errors": "zero"}
+    campaign = rrru.read_campaign(_measured(arm, generator), arm, **stated)
     found = rrru.calibrate(campaign)
-    row = found.parameters.query("method == 'least_squares'").set_index("parameter").loc["dq2"]
+    row = found.parameters.query("method == 'least_squares'").set_index("parameter").loc["daxis2"]
     assert abs(row["value"] - ZERO_RAD) < 4.0 * row["standard_error"] < 1e-4
     assert abs(found.rms_mm / (NOISE_MM * np.sqrt(3.0)) - 1.0) < 0.2
     steps = []

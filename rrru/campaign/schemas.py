@@ -51,14 +51,17 @@ campaign
 run                    int    as in measurements
 trajectory             str    as in measurements
 point                  int    as in measurements
-translational_measure  float  0 where the platform can move with locked drives
+translational_measure  float  0 where the platform can move with locked drives; of own robots the smallest over the
+    largest singular value of the position Jacobian, angles times the characteristic length: 0 where the drives cannot
+    move the point in some direction
 constraint_measure     float  0 where the platform can turn with locked drives; eq. (8) does not see it
 constraint_determinant float  changes its sign across a constraint singularity; positive for own robots of chains
 status                 str    as in measurements {ok, outlier, stale, near_singularity, unsolved, held_out}
 
 ## workspace | campaigns/{campaign}/workspace.parquet | slice x_mm y_mm z_mm
 Regular grid over two slices of the workspace: xz at y = 0, xy through the middle of the commanded points;
-xz through that middle, too, where the robot reaches nothing at y = 0.
+xz through that middle, too, where the robot reaches nothing at y = 0. None of robots that orient their tool: what
+they reach depends on its orientation.
 --
 campaign
 slice                  str    plane {xz, xy}
@@ -100,11 +103,13 @@ unsolved               int    points with status unsolved
 noise_mm               float  measuring noise per axis, 1 sigma
 noise_rad              float? noise of measured orientations per axis, 1 sigma; null where none was measured
 noise_from             str    given: by the configuration; readings: median of what the file states of each reading;
-    repeats: pooled over repeated points; high_frequency: from the residuals along the path of a fit of all points
-    {given, readings, repeats, high_frequency}
+    repeats: pooled over repeated points; high_frequency: from the residuals along the path of a fit of all points,
+    which has the robot's systematic errors in it where the poses follow no path {given, readings, repeats,
+    high_frequency}
 platform_mass_kg       float? the real robot's platform, as given; null where it was not
-registration_rms_mm    float? residual of the frame registration; null where the frame was the robot's
-registration_max_mm    float? largest residual of the frame registration
+registration_rms_mm    float? rms of the distance in space from the commanded points after the frame registration,
+    before any calibration: errors of the robot's geometry are in it; null where the frame was the robot's
+registration_max_mm    float? largest distance of a point after the frame registration
 min_translational_measure float  nearest approach to a translational singularity
 min_constraint_measure float  nearest approach to a constraint singularity
 notes                  str    what was computed or missing on ingest; empty where nothing was

@@ -84,7 +84,9 @@ share_high             float  upper end, 95 %, from the posterior
 probability            float? that the part is real; null where that is no question, or where no noise is stated
 
 ## gap_locate | tables/gap_locate.parquet | campaign factor level
-Where the gap is largest: its variance by factor, split over the levels of each factor.
+Where the gap is largest: its variance by factor, split over the levels of each factor. The factor drive expresses each
+residual as errors of all drives together. Drives that move the point alike share these: their rms_mm do not add up to
+the gap, and the largest share does not name the drive at fault.
 --
 campaign
 factor                 str    what the points are split by {trajectory, region, direction, drive, motion_direction,
@@ -127,7 +129,7 @@ group_probability      float? that one of its group is at work; null where it is
 legs                   str    on each leg its own value, one value on all (same), or the one leg; empty where legs
     make no difference
 log_evidence           float? of the best hypothesis with this effect over none, natural logarithm
-heldout_gain           float? log predictive score gained on left-out runs by adding it to the calibration
+heldout_gain           float? log predictive score gained at left-out points by adding it to the calibration
 heldout_gain_low       float? lower end, 95 %, from the folds; null where there is one
 heldout_gain_high      float? upper end, 95 %
 note                   str    empty where there is nothing to say
@@ -163,9 +165,9 @@ step                   int    0: calibration alone
 added                  str    effect added at this step; empty at 0
 effects                str    all effects so far, joined by +, or none
 trajectory             str    trajectory, * for all
-kind                   str    held_out: on runs that were not fitted on; resimulated: fitted on all runs, through the
-    full spatial closure; given_model, corrected_model: the robot's file as it came, and as it is written back, on all
-    runs {held_out, resimulated, given_model, corrected_model}
+kind                   str    held_out: at points that the fit has not used; resimulated: fitted on all runs, through
+    the full spatial closure; given_model, corrected_model: the robot's file as it came, and as it is written back, on
+    all runs {held_out, resimulated, given_model, corrected_model}
 points
 rms_mm                 float  measured minus model
 max_mm                 float  largest distance

@@ -30,7 +30,7 @@ _CHECK = (
 NOT_CORRECTED = "not corrected: "
 _WORDS = DriveWords()
 # units of sentences for those of tables, and the factor: without rows of zeros
-_READABLE = {"1": ("", 1.0), "rad/(N mm)": ("mrad/(N m)", 1e6), "mm/(N mm)": ("µm/(N m)", 1e6)}
+_READABLE = {"1": ("", 1.0), "rad/(N mm)": ("µrad/(N m)", 1e9), "mm/(N mm)": ("µm/(N m)", 1e6)}
 _READABLE |= {"mm/N": ("µm/N", 1e3), "1/K": ("µm/(m K)", 1e6), "mm/s": ("µm/s", 1e3), "rad/s": ("µrad/s", 1e6)}
 _LIMITED = (NO_PAYLOAD, WITHIN_LIMITS)
 _UNSURE = "No cause is probable enough to be named; the most probable answer follows."
@@ -102,8 +102,10 @@ def readable(name):
 
 
 def rounded(value, digits=2):
-    """A number to some significant digits, without an exponent."""
-    if not (value and np.isfinite(value)):
+    """A number to some significant digits, without an exponent; "unknown" for None and what is not finite."""
+    if value is None or not np.isfinite(value):
+        return "unknown"
+    if value == 0.0:
         return "0"
     places = digits - 1 - int(np.floor(np.log10(abs(value))))
     return f"{round(value, places):.{max(places, 0)}f}"
@@ -214,14 +216,15 @@ def _causes(facts):
     said = [_by_share(facts, groups, len(small))] if with_shares and len(facts["effects"]) > 1 else []
     said = ([_UNSURE] if any(effect["decision"] == POSSIBLE for effect in single) else []) + said
     single = [effect for effect in single if effect["name"] not in small]
-    said += [_cause(effect, "" if number else " of that", with_shares) for number, effect in enumerate(single)]
+    said += [_cause(effect, "" if number else " of the gap", with_shares) for number, effect in enumerate(single)]
     said += [_of_group(group, with_shares) for group in groups.values()]
     if not with_shares and said:
         small = facts["gap_rms_mm"] <= facts["noise_rms_mm"]
         why = "The gap is too small relative to the noise" if small else "The effects are confounded with each other"
         said.append(f"{why}: their shares of the gap cannot be determined.")
     elif _overlap(facts):
-        said.append("These shares overlap: parts of the effects are correlated at these points.")
+        with_rest = " and of what is unexplained" if facts["unexplained"] else ""
+        said.append(f"These shares add up to more than the gap: parts of the effects{with_rest} cancel each other.")
     if facts["unexplained"]:
         share = share_with_interval(next(part for part in facts["budget"] if part["kind"] == "unexplained"))
         if said:
@@ -367,7 +370,8 @@ def _left(facts):
     """Residual error with the effects in the simulator."""
     after, noise = (rounded(facts[name]) for name in ("gap_after_rms_mm", "noise_rms_mm"))
     what = "it" if len(facts["effects"]) == 1 else "them"
-    return [f"With {what} in the simulator the residual error on left-out runs is {after} mm; the noise is {noise} mm."]
+    size = f"{after} mm; the noise is {noise} mm"
+    return [f"With {what} in the simulator the residual error at left-out points is {size}."]
 
 
 def _open(facts):
@@ -383,7 +387,7 @@ def _open(facts):
     listed += [f"that {readable(name)} does not act" for name in named if name in uncertain]
     if not listed:
         return []
-    first = "Parts of it could be" if facts["unexplained"] else "These data cannot rule out"
+    first = "Parts of the unexplained share could be" if facts["unexplained"] else "These data cannot rule out"
     return [f"{first}: {', '.join(listed)}."]
 
 
@@ -405,7 +409,8 @@ def _next(facts):
     if said:
         return said
     if facts["unexplained"]:
-        return ["Next: no run is advised, since no effect model fits; gap_locate says where the gap is largest."]
+        where = "gap_locate says where the gap is largest"
+        return [f"Next: no run is advised, since no effect model fits the unexplained part; {where}."]
     decided = not (facts["groups"] or facts["confusable_with"])
     least = min((effect["probability"] for effect in facts["effects"]), default=facts["probability"])
     if max(least if decided else 0.0, facts["probability"]) >= OPTIONS.min_sure_probability:

@@ -39,8 +39,8 @@ def gap(tables, options):
     of confounded parts (hatched) and the sampling of the noise (dotted) complete them to 1. The probability in the
     headline is that of exactly these causes, of a group alone that one of it acts. (a) Where: measured minus
     calibrated model at the points from above and from the side, magnified as stated. (b) Why: probability of every
-    effect, those of the verdict in colour, those of a group hatched. (c) Remaining gap: on runs that were not fitted
-    on, under the calibrated and the corrected model, with the share closed. (d) Residual of every point.
+    effect, those of the verdict in colour, those of a group hatched. (c) Remaining gap: at points that the fit
+    has not used, under the calibrated and the corrected model, with the share closed. (d) Residual of every point.
     """
     campaign, frames = options["campaign"], {}
     for name in ("gap_verdicts", "gap_attribute", "gap_shrink", "gap_budget"):

@@ -17,21 +17,36 @@ _NEAR = {"color": style.VERMILION, "linestyle": "none", "marker": "o", "markersi
 _PATH = {"color": "black", "linewidth": 0.8}
 _MEASURES = {"translational_measure": "translational measure", "constraint_measure": "constraint measure"}
 
+_AT_POSES = {"translational_measure": "position Jacobian", "constraint_measure": "constraint measure"}
+_VIEWS = ("side view", "top view")
+_DOT = {"s": 11.0, "edgecolors": "#444444", "linewidths": 0.25}
+_NEAR_POSE = {**_NEAR, "markersize": 6.0, "markerfacecolor": "none"}
+_OF_LOOPS = "smallest singular value of the legs' unit wrenches, 0 at a singularity"
+_BAR_PLACE = {"location": "bottom", "aspect": 60, "fraction": 0.03, "spacing": "uniform"}
+_BAR = "smallest / largest singular value of the position Jacobian, 0 at a singularity"
+# a constraint measure above this is 1 up to rounding; heights of a view over its width
+_NO_LOOP, _LOWEST, _HIGHEST = 1.0 - 1e-6, 0.35, 1.1
+
 _FIELDS = (*_MEASURES, "constraint_determinant")
 
 
 @style.printed
 def workspace(tables, options):
-    """Distance from both kinds of singularity over the reachable workspace, and the commanded paths projected on
-    it. Hatched is out of reach; on the line the constraint determinant changes its sign.
+    """Distance from singularities, and the commanded points, projected. A robot that cannot orient its tool has it over
+    the reachable workspace: hatched is out of reach; on the line the constraint determinant changes its sign. A robot
+    that orients it has it at the commanded poses, since its reach depends on the orientation: the smallest over the
+    largest singular value of the position Jacobian, angles times the characteristic length, and the constraint measure
+    where legs close loops.
     """
     campaign = options["campaign"]
-    grid_rows = choose.of_campaign(tables, "workspace", campaign, "workspace")
     facts = choose.of_campaign(tables, "campaigns", campaign, "workspace").iloc[0]
+    grid_rows = choose.where(tables["workspace"], campaign=campaign)
+    points = _points(tables, campaign)
+    if grid_rows.empty:
+        return _at_poses(points, bool(facts["z_down"]))
     slices = [name for name in _SLICES if (grid_rows["slice"] == name).any()]
     if not slices:
         raise ConfigError(f"workspace: campaign {campaign!r} has none of the slices {', '.join(_SLICES)}")
-    points = _points(tables, campaign)
     grids = [_slice(grid_rows[grid_rows["slice"] == name], name) for name in slices]
     ratios = [np.ptp(grid.up_mm) / np.ptp(grid.across_mm) for grid in grids]
     figure = style.new(style.DOUBLE_MM, 32.0 + 75.0 * sum(ratios) + 14.0 * len(slices))
@@ -47,10 +62,42 @@ def workspace(tables, options):
             style.height_axis(row[0], bool(facts["z_down"]))
         else:
             row[0].set_ylabel(f"{grid.up} (mm)")
-    place = {"location": "bottom", "aspect": 60, "fraction": 0.03, "spacing": "uniform"}
-    bar = figure.colorbar(image, ax=list(panels.ravel()), **place)
+    bar = figure.colorbar(image, ax=list(panels.ravel()), **_BAR_PLACE)
     bar.set_label("singularity measure: 0 at a singularity, 1 at best")
     figure.legend(handles=_legend(points), loc="outside upper center", ncols=3, columnspacing=1.4)
+    return figure
+
+
+def _at_poses(points, z_down):
+    """The commanded points from the side and from above, coloured by each measure at their own pose."""
+    # an open chain has no constraint to lose: its constraint measure is 1 everywhere
+    closed = bool((points["constraint_measure"] < _NO_LOOP).any())
+    measures = dict(list(_AT_POSES.items())[: 1 + closed])
+    spans = {axis: max(np.ptp(points[f"command_{axis}_mm"]), 1.0) for axis in "xyz"}
+    ratios = [min(max(spans[up] / spans[across], _LOWEST), _HIGHEST) for across, up, _ in _SLICES.values()]
+    figure = style.new(style.DOUBLE_MM, 34.0 + (75.0 * max(ratios) + 14.0) * len(measures))
+    panels = figure.subplots(len(measures), 2, squeeze=False)
+    marks = iter("abcd")
+    for row, (measure, meaning) in zip(panels, measures.items(), strict=True):
+        for axes, (across, up, _), view in zip(row, _SLICES.values(), _VIEWS, strict=True):
+            image = axes.scatter(
+                *(points[f"command_{axis}_mm"] for axis in (across, up)),
+                c=points[measure],
+                **_DOT,
+                cmap=style.MEASURE,
+                norm=BoundaryNorm(_LEVELS, 256),
+            )
+            near = points[points["status"] == "near_singularity"]
+            axes.plot(near[f"command_{across}_mm"], near[f"command_{up}_mm"], **_NEAR_POSE)
+            axes.set_title(f"({next(marks)}) {meaning}, {view}")
+            axes.set(xlabel=f"{across} (mm)", ylabel=f"{up} (mm)", aspect="equal")
+            axes.margins(0.06)
+        style.height_axis(row[0], z_down)
+    bar = figure.colorbar(image, ax=list(panels.ravel()), **_BAR_PLACE)
+    bar.set_label(f"(a, b) {_BAR}\n(c, d) {_OF_LOOPS}" if closed else _BAR)
+    if (points["status"] == "near_singularity").any():
+        handle = Line2D([], [], label="commanded pose near a singularity", **_NEAR_POSE)
+        figure.legend(handles=[handle], loc="outside upper center")
     return figure
 
 
@@ -85,8 +132,9 @@ def _slice(rows, name):
 
 
 def _points(tables, campaign):
-    """Commanded points of the campaign with their singularity status."""
-    singular = choose.of_campaign(tables, "singularity", campaign, "workspace")[["run", "point", "status"]]
+    """Commanded points of the campaign with their singularity status and measures."""
+    columns = ["run", "point", "status", *_MEASURES]
+    singular = choose.of_campaign(tables, "singularity", campaign, "workspace")[columns]
     paths = tables["measurements"][["run", "trajectory", "point", *(f"command_{axis}_mm" for axis in "xyz")]]
     return paths.merge(singular, on=["run", "point"], how="left", validate="one_to_one")
 

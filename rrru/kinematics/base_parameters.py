@@ -134,6 +134,5 @@ def choose(columns, allowed, least, basis=None):
 
 def in_words(combination, names):
     """A combination (k,) of the first k names, such as "0.71 base1_x - 0.2 dl1"; "nothing" where it is none."""
-    return (
-        " + ".join(f"{c:.3g} {name}" for c, name in zip(combination, names, strict=False) if abs(c) > 1e-6) or "nothing"
-    )
+    terms = (f"{c:.3g} {name}" for c, name in zip(combination, names, strict=False) if abs(c) > 1e-6)
+    return " + ".join(terms).replace("+ -", "- ") or "nothing"

@@ -201,10 +201,13 @@ class TwistMap:
         force = -np.einsum("nir,ni->nr", self.platform, load)
         return np.stack([np.einsum("nr,nri->ni", force[:, rows], one) for _, _, one, rows in self._legs])
 
-    @property
-    def translational_measure(self):
-        """Smallest singular value (n,) of the drives' Jacobian over its largest; 0 where they cannot move the point."""
-        size = _singular_values(self.drive_response)
+    def translational_measure(self, lengths_mm):
+        """Smallest singular value (n,) of the position Jacobian over its largest; 0 where it moves in no direction.
+
+        lengths_mm (K,): by which each drive's value is multiplied to be comparable: the characteristic length of drives
+        that turn, 1 of those that slide (Angeles, Fundamentals of Robotic Mechanical Systems, section 5.8).
+        """
+        size = _singular_values(self.drive_response / lengths_mm)
         return size[:, -1] / size[:, 0]
 
     def constraint_measures(self, arm_mm):

@@ -231,11 +231,12 @@ class Robot(ABC):
         """Distance of poses from singularities: translational measure, constraint measure and determinant, each (n,).
 
         The constraint measure is the smallest singular value of the legs' unit wrenches, lengths counted in the robot's
-        angle_arm_mm, 0 where the platform can move with locked drives; the translational one that of the drives'
-        Jacobian over its largest, 0 where they cannot move the point in some direction.
+        angle_arm_mm, 0 where the platform can move with locked drives; the translational one that of the position
+        Jacobian over its largest, angles times angle_arm_mm, 0 where they cannot move the point in some direction.
         """
         at = self.map_at(actuators, position_mm)
-        return at.translational_measure, *at.constraint_measures(self.angle_arm_mm)
+        lengths = np.array([1.0 if unit == "mm" else self.angle_arm_mm for unit in self.parts.units])
+        return at.translational_measure(lengths), *at.constraint_measures(self.angle_arm_mm)
 
     def own_load(self, masses, motion, poses, gravity_mm_s2):
         """Loads (n, D) on the driven values, in N mm or N, of all moving masses except the platform's; none here.

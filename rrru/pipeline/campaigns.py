@@ -24,8 +24,12 @@ def with_singularities(robot, measurements, margin):
 def workspace_table(robot, measurements):
     """Rows of `workspace`: a vertical slice and the horizontal one through the middle of the commands.
 
-    The vertical one is y = 0, or through the same middle where the robot reaches no point there.
+    The vertical one is y = 0, or through the same middle where the robot reaches no point there. No rows for robots
+    that orient their tool: what they reach depends on its orientation.
     """
+    names = ("reachable", "translational_measure", "constraint_measure", "constraint_determinant")
+    if robot.orients:
+        return pd.DataFrame(columns=["x_mm", "y_mm", "z_mm", "slice", *names])
     _, side, height = rows.command(measurements).mean(axis=0).round(-1)
     reach = float(robot.reach_mm)
     # where z points down, the platform is on that side of the base
@@ -34,7 +38,6 @@ def workspace_table(robot, measurements):
     for plane, places, vertical in (("xz", (0.0, side), down), ("xy", (height,), across)):
         grids = (workspace.slice_points(plane, at, across, vertical, step) for at in places)
         points, actuators = _around_reachable(robot, grids, step)
-        names = ("reachable", "translational_measure", "constraint_measure", "constraint_determinant")
         measures = dict(zip(names, workspace.measures(robot, points, actuators), strict=True))
         frames.append(pd.DataFrame(points, columns=["x_mm", "y_mm", "z_mm"]).assign(slice=plane, **measures))
     return pd.concat(frames, ignore_index=True)

@@ -51,8 +51,8 @@ class Advice:
 @dataclass(frozen=True)
 class Card:
     """One campaign's answer: its source, the answer in a line, sizes in mm as text, the lead sentence, the others,
-    Advice on each cause, the next step, notes, links to corrected files of the robot, their errors, and parts and steps
-    of the bars.
+    Advice on each cause, the next step, notes, links to corrected files of the robot and to corrected drive values, the
+    files' errors, and parts and steps of the bars.
     """
 
     campaign: str
@@ -67,14 +67,15 @@ class Card:
     next: str
     notes: list
     models: list
+    drives: str
     worth: list
     parts: list
     steps: list
 
 
-def card(facts, source="", found=None, models=()):
+def card(facts, source="", found=None, models=(), drives=""):
     """The Card of facts; source: where the campaign came from; found: the Worth of its calibration, or None; models:
-    links to corrected files of the robot.
+    links to corrected files of the robot; drives: the one to `corrected_drives`, empty without these.
     """
     lead, *others, following = facts["sentences"]
     if found is not None:
@@ -92,6 +93,7 @@ def card(facts, source="", found=None, models=()):
         following,
         facts["notes"],
         [] if _not_corrected(facts) else list(models),
+        "" if facts["no_answer"] else drives,
         _file_worth(facts),
         [] if facts["no_answer"] else _parts(facts["budget"]),
         _steps(facts),
@@ -137,10 +139,17 @@ def _file_worth(facts):
         return []
     if file["error_mm"] is None:
         return []
-    sizes = (file[key] for key in ("error_mm", "error_fresh_mm"))
-    at_measured, at_fresh = (rounded(size) if size >= _LEAST_MM else f"less than {_LEAST_MM}" for size in sizes)
-    said = f"It is {at_measured} mm rms off the diagnosed robot at the measured poses, {at_fresh} mm at 200 fresh ones."
+    at_measured, at_fresh = (_file_error(file[key]) for key in ("error_mm", "error_fresh_mm"))
+    fresh = f"{at_fresh} at 200 fresh ones" if at_fresh else "at the fresh ones it has no pose"
+    said = f"It is {at_measured} rms off the diagnosed robot at the measured poses, {fresh}."
     return [said, *([f"{file['remainder'][0].upper()}{file['remainder'][1:]}."] if file["remainder"] else [])]
+
+
+def _file_error(size_mm):
+    """A size in mm as text, empty where it is not known."""
+    if size_mm is None:
+        return ""
+    return f"{rounded(size_mm) if size_mm >= _LEAST_MM else f'less than {_LEAST_MM}'} mm"
 
 
 def _parts(budget):

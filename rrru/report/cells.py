@@ -72,7 +72,7 @@ def text(value):
 def short(value):
     """A number to four digits; an exponent only where there are many zeros."""
     if not np.isfinite(value):
-        return f"{value}".replace("-", MINUS)
+        return "∞" if value > 0.0 else f"{MINUS}∞"
     if value == 0.0:
         return "0"
     size = int(np.floor(np.log10(abs(value))))

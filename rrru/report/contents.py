@@ -69,7 +69,7 @@ SECTIONS = (
         "calibration",
         "Calibration: which parameters may be trusted",
         "Each parameter with its 95 % interval: it holds the truth in 95 of 100 cases, if the model is complete. "
-        "Where the diagnosis has found effects, parameters that change by more with them are biased.",
+        "Where the diagnosis has found effects, parameters that they change by more than their error are biased.",
         own=(
             ("observability", "What the measured points see", ""),
             ("workspace", "Where the points lie", ""),

@@ -106,6 +106,11 @@ class Results:
         found = sorted((self.folder / "campaigns" / name).glob("corrected.*"))
         return [os.path.relpath(place, start) for place in found]
 
+    def drives(self, name, start):
+        """Link to the robot's `corrected_drives` from the folder start; empty where there are none."""
+        place = self.folder / "campaigns" / name / "corrected_drives.parquet"
+        return os.path.relpath(place, start) if place.is_file() and len(tables.read(place)) else ""
+
     def picture(self, name, title):
         """A figure of a path below figures/ without its ending, None where it was not drawn."""
         place = self.folder / "figures" / f"{name}.svg"
@@ -146,8 +151,9 @@ def write(folder, path, reproduced, campaign=None):
         answer = json_files.read(results.folder / "campaigns" / name / "verdict.json")
         drawn = results.picture(f"{name}/gap_map", f"{name}: residual errors")
         found = results.worth(name, answer["noise_rms_mm"])
-        source, models = sources.get(name, "virtual robot of a study"), results.models(name, Path(path).parent)
-        answers.append((cards.card(answer, source, found, models), drawn))
+        source, start = sources.get(name, "virtual robot of a study"), Path(path).parent
+        links = results.models(name, start), results.drives(name, start)
+        answers.append((cards.card(answer, source, found, *links), drawn))
     chosen = [s for s in contents.SECTIONS if campaign is None or s.key in contents.OF_A_CAMPAIGN]
     parts = [part for part in (_part(results, section) for section in chosen) if part]
     values = {"answers": answers, "parts": parts, "campaign": campaign, "glyphs": results.glyphs}

@@ -36,9 +36,9 @@ def worth(errors, points, noise_rms_mm, registered):
 
 def sentences(found, left_out_mm):
     """Sentences on a Worth; left_out_mm: residual error at points that were left out of the calibration."""
-    registered = ", once the instrument's frame was fitted" if found.registered else ""
-    size = f"{rounded(found.before_mm)} mm at the same {found.points} points, with the same noise subtracted"
-    said = [f"Before any calibration the error is {size}{registered}."]
+    registered = ", after registration of the instrument's frame" if found.registered else ""
+    size = f"{rounded(found.before_mm)} mm rms{registered} (distance in space, noise subtracted)"
+    said = [f"Before any calibration the error at the same {found.points} points is {size}."]
     if left_out_mm >= found.before_mm:
         said.append(
             f"At points that the calibration has used, the residual error is {rounded(found.seen_mm)} mm: it has "

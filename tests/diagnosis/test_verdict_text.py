@@ -77,14 +77,14 @@ def test_the_sentences_say_what_acts_how_much_how_sure_and_what_next():
     said = " ".join(answered(runs=(RUN,))["sentences"])
     for words in (
         "the residual error is 0.37 mm at points left out of it (noise subtracted)",
-        "60 % of that (95 %: 48 % to 78 %) is link flexure in leg 2, ",
+        "60 % of the gap (95 %: 48 % to 78 %) is link flexure in leg 2, ",
         "flexure2 = 1.23 µm/N (95 %: 1.01 to 1.45): ",
         "20 % (95 %: 16 % to 26 %) is backlash, width1 = width2 = 0.000404 rad (95 %: 0.000365 to 0.000443): backlash ",
         "backlash between motor and drive arm.",
         "Causes by their share of the gap: link flexure 60 %, backlash 20 %.",
         "Probability that it acts: link flexure 0.98, backlash 0.97. Probability of exactly this answer: 0.97.",
         "10 % (95 %: 8 % to 13 %) does not repeat",
-        "With them in the simulator the residual error on left-out runs is 0.020 mm",
+        "With them in the simulator the residual error at left-out points is 0.020 mm",
         "the noise is 0.035 mm",
         "cannot rule out: drive compliance, servo lag.",
         "Next: drive line_1 in reverse. That decides whether servo lag acts.",
@@ -105,7 +105,7 @@ def test_shares_overlap_only_where_there_are_several(shares, overlap):
         budget.loc[budget["part"] == name, "share"] = share or 0.0
     effects = "link_flexure+backlash" if shares[1] else "link_flexure"
     said = " ".join(answered(budget=budget, effects=effects)["sentences"])
-    assert ("These shares overlap" in said) == overlap
+    assert ("These shares add up to more than the gap" in said) == overlap
 
 
 def test_confounded_causes_are_one_sentence_with_their_probabilities():
@@ -266,7 +266,7 @@ def test_where_nothing_acts_or_the_library_lacks_it_no_effect_is_blamed():
         "no effect of the library explains it: 5 % (95 %: 4 % to 6 %) of it" in unknown
         and " is backlash" not in unknown
     )
-    assert "Parts of it could be: drive compliance." in unknown
+    assert "Parts of the unexplained share could be: drive compliance." in unknown
 
 
 @given(st.floats(1e-7, 1e6), st.integers(1, 5))
@@ -274,6 +274,18 @@ def test_a_rounded_number_is_off_by_half_a_digit_at_most(value, digits):
     text = verdict_text.rounded(-value, digits)
     assert abs(float(text) + value) <= 0.5000001 * 10.0 ** (np.floor(np.log10(value)) - digits + 1)
     assert "e" not in text
+
+
+@pytest.mark.parametrize("value", [None, np.nan, np.inf])
+def test_a_size_that_is_not_known_is_not_zero(value):
+    assert verdict_text.rounded(value) == "unknown" and verdict_text.rounded(0.0) == "0"
+
+
+def test_compliances_of_joints_are_in_microradians_per_newton_metre():
+    """6.67e-9 rad/(N mm) = 6.67e-6 rad/(N m)."""
+    row = {"parameter": "compliance2", "unit": "rad/(N mm)", "value": 6.67e-9, "standard_error": 6e-11}
+    (size,) = verdict_text._sizes([row | {"low_95": 6.55e-9, "high_95": 6.79e-9}])
+    assert size == "compliance2 = 6.67 µrad/(N m) (95 %: 6.55 to 6.79)"
 
 
 @given(st.floats(-1e3, 1e3), st.floats(1e-7, 1e2))

@@ -187,7 +187,7 @@ def calibrations():
         for c in TABLES["calibrations"].columns
         if c.kind in ("int64", "float64")
     }
-    labels = {"campaign": CAMPAIGN, "method": OPTIONS["method"], "noise_from": "given"}
+    labels = {"campaign": CAMPAIGN, "method": OPTIONS["method"], "noise_from": "campaign"}
     rows = [numbers | labels | {"calibration": name, "mean_mm": OPTIMUM_MM} for name in SETS]
     return check("calibrations", pd.DataFrame(rows))
 

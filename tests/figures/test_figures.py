@@ -327,6 +327,17 @@ def test_a_sweep_without_visible_scatter_and_one_slice_are_drawn_too(frames):
     assert len(figure.axes) == 3 and len(figure.legends[0].get_texts()) == 2
 
 
+@pytest.mark.parametrize(("constraint", "panels"), [(1.0, 2), (0.4, 4)])
+def test_robots_that_orient_are_drawn_at_their_poses_without_a_region_out_of_reach(frames, constraint, panels):
+    """An open chain has no panel of a constraint measure, which is 1 everywhere."""
+    poses = frames["singularity"].assign(constraint_measure=constraint)
+    figure = draw("workspace", frames | {"workspace": frames["workspace"].head(0), "singularity": poses})
+    *views, bar = figure.axes
+    assert len(views) == panels and not any(axes.patch.get_hatch() or axes.images for axes in views)
+    assert all(len(axes.collections[0].get_offsets()) == len(poses) for axes in views)
+    assert "largest singular value of the position Jacobian" in bar.get_xlabel()
+
+
 @pytest.mark.parametrize("z_down", [True, False])
 def test_the_workspace_hangs_as_its_robots_frame_says(frames, z_down):
     low, high = draw("workspace", frames | {"campaigns": synthetic.campaigns(z_down)}).axes[0].get_ylim()

@@ -316,7 +316,7 @@ def test_the_translational_measure_is_that_of_the_drives_jacobian(name):
     robot, points, actuators = _clear(name)
     at = robot.map_at(actuators, points)
     size = np.linalg.svd(robot.actuator_jacobian(points, actuators), compute_uv=False)
-    np.testing.assert_allclose(at.translational_measure, size[:, -1] / size[:, 0], rtol=1e-9)
+    np.testing.assert_allclose(at.translational_measure(1.0), size[:, -1] / size[:, 0], rtol=1e-9)
     measure, determinant = at.constraint_measures(robot.angle_arm_mm)
     assert (measure > 1e-3).all() and (measure < 1.0).all() and (np.abs(determinant) > 0.0).all()
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from rrru.kinematics import singularity, workspace
+from rrru.robots.catalogue import make_mechanism
 from rrru.robots.rrru3 import Rrru3
 from tests.reference.spatial_chain import closure_determinant
 
@@ -68,3 +69,23 @@ def test_workspace_slice_is_reachable_exactly_where_the_inverse_exists():
     assert (reachable == np.isfinite(Rrru3().inverse(points)).all(axis=1)).all()
     assert 0 < reachable.sum() < len(points)
     assert np.isfinite(translational[reachable]).all() and np.isnan(constraint[~reachable]).all()
+
+
+def test_the_measure_of_a_scara_is_that_of_its_two_links_and_its_slide():
+    """Closed form: the planar Jacobian of two links by the characteristic length, and 1 for the slide; see Craig."""
+    links, arm_mm = (400.0, 300.0), 500.0
+    dh = [{"a_mm": links[0], "range_deg": [-170, 170]}, {"a_mm": links[1], "alpha_deg": 180, "range_deg": [-170, 170]}]
+    robot = make_mechanism("scara", {"dh": [*dh, {"sliding": True, "range_mm": [0, 200]}]})
+    assert robot.angle_arm_mm == arm_mm
+    drives = np.random.default_rng(3).uniform([-2.0, -2.5, 10.0], [2.0, 2.5, 190.0], (50, 3))
+    drives[0, 1] = 0.0  # stretched
+    measure, *_ = robot.singularities(robot.forward(drives), drives)
+    for (first, second, _), found in zip(drives, measure, strict=True):
+        upper, lower = links[0] * np.exp(1j * first), links[1] * np.exp(1j * (first + second))
+        planar = [1j * (upper + lower), 1j * lower]
+        jacobian = np.zeros((3, 3))
+        jacobian[:2, :2] = np.array([[one.real for one in planar], [one.imag for one in planar]]) / arm_mm
+        jacobian[2, 2] = 1.0
+        size = np.linalg.svd(jacobian, compute_uv=False)
+        assert found == pytest.approx(size[-1] / size[0], abs=1e-9)
+    assert measure[0] == pytest.approx(0.0, abs=1e-9) and np.median(measure) > 0.2

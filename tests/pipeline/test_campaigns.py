@@ -9,6 +9,8 @@ import pytest
 from rrru.campaign.measurements import vector_columns
 from rrru.pipeline.campaigns import workspace_table
 from rrru.robots.catalogue import make_mechanism
+from tests.places import ROOT
+from tests.schemas import TABLES
 
 _LOW, _HIGH = np.array([0.0, 100.0, -50.0]), np.array([1000.0, 800.0, 450.0])
 
@@ -29,6 +31,13 @@ def _commands(points):
 def test_the_gantry_s_slides_are_its_axes():
     robot, drives = _gantry(), np.random.default_rng(1).uniform(_LOW, _HIGH, (10, 3))
     np.testing.assert_allclose(robot.forward(drives), drives, atol=1e-9)
+
+
+def test_a_robot_that_orients_has_no_region_of_reach():
+    robot = make_mechanism("arm", {"urdf": str(ROOT / "data/models/arm6.urdf")})
+    table = workspace_table(robot, _commands([[500.0, 0.0, 800.0], [600.0, 100.0, 700.0]]))
+    assert robot.orients and table.empty
+    assert set(TABLES["workspace"].names) == {*table.columns, "campaign"}
 
 
 def test_no_corner_of_a_gantry_is_farther_than_its_reach():

@@ -18,7 +18,7 @@ def test_a_number_keeps_four_digits(value):
 
 _CELLS = (
     *((True, "yes"), (np.bool_(False), "no"), (None, "–"), (np.nan, "–"), (0.0, "0"), (-3, "\N{MINUS SIGN}3")),
-    *((0.25, "0.25"), (1234.5, "1234"), (2.0, "2"), ("a-b", "a-b"), (np.inf, "inf")),
+    *((0.25, "0.25"), (1234.5, "1234"), (2.0, "2"), ("a-b", "a-b"), (np.inf, "∞"), (-np.inf, "\N{MINUS SIGN}∞")),
 )
 _HEADS = (
     *(("gap_rms_mm", "gap rms (mm)"), ("speed_mm_s", "speed (mm/s)"), ("points", "points")),

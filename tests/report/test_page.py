@@ -1,7 +1,10 @@
 """The page of whatever is there: parts of a run, nothing at all, left-overs of an earlier one."""
 
+import re
 import shutil
 
+import numpy as np
+import pandas as pd
 import pytest
 from markupsafe import escape
 
@@ -72,6 +75,39 @@ def test_errors_of_a_corrected_file_are_next_to_its_link(folder):
     worth = text.index("It is 0.31 mm rms off the diagnosed robot at the measured poses, 0.54 mm at 200 fresh ones.")
     assert link < worth < text.index(remains[1:]) and f'<p class="lead">{remains[:10]}' not in text
     assert '<p class="lead">After calibration' in text
+
+
+def test_a_corrected_file_without_fresh_poses_says_so(folder):
+    text = _with_file(folder, file_error_mm=0.31, file_error_fresh_mm=np.nan)
+    said = "It is 0.31 mm rms off the diagnosed robot at the measured poses, at the fresh ones it has no pose."
+    assert said in text
+
+
+_UNKNOWN = (
+    {"file_error_mm": np.nan, "not_in_model": "backlash"},
+    {"file_error_mm": 0.3, "file_error_fresh_mm": np.nan},
+    {"noise_stated_mm": np.nan, "gap_after_rms_mm": 0.0},
+    {"effects": "unexplained", "leg": 0, "follows": [("the time", 0.9, np.nan, "s", 0.1)]},
+    {"runs": (("line_1 once more", "run", "line_1", False, np.nan, np.nan, 26, "backlash / none", np.nan),)},
+)
+
+
+@pytest.mark.parametrize("unknown", _UNKNOWN, ids=str)
+def test_no_text_of_a_page_has_a_number_that_is_none(folder, unknown):
+    budget = synthetic_gap.gap_budget(CAMPAIGN).assign(probability=np.nan)
+    text = _with_file(folder, budget=budget, **unknown)
+    seen = re.sub(r"<(script|style|svg)\b.*?</\1>|<[^>]*>", " ", text, flags=re.DOTALL)
+    assert "After calibration" in seen and not re.findall(r"\b(?:nan|NaN|inf|None)\b", seen)
+
+
+def test_corrected_drive_values_are_linked_where_there_are_any(folder):
+    place = folder / "campaigns" / CAMPAIGN / "corrected_drives.parquet"
+    pd.DataFrame({"point": []}).to_parquet(place)
+    assert "corrected_drives" not in _with_file(folder)
+    pd.DataFrame({"point": [1]}).to_parquet(place)
+    assert f'<a href="campaigns/{CAMPAIGN}/corrected_drives.parquet">corrected_drives</a>' in _with_file(folder)
+    unsure = _with_file(folder, effects="unexplained", no_answer="no", not_in_model="not corrected: no")
+    assert "corrected_drives.parquet" not in unsure
 
 
 def test_a_corrected_file_that_is_worse_than_the_calibration_is_the_headline(folder):

@@ -65,11 +65,12 @@ def ingest(spec: IngestSpec, mechanism: Robot) -> Ingested:
         sheet = replace(sheet, frame=sheet.frame.assign(**moved))
         check_measured(at_tool(sheet, mounted), lambda: "rows that belong to each other")
         sheet.problems.refuse()
-        zeros = ", with the zeros of the drives that were found" if mounted and mounted.zeros_lost else ""
-        residual = f"residual {registration.rms_mm:.4g} mm rms, {registration.max_mm:.4g} mm at most{zeros}"
+        zeros = " and with the zeros of the drives that were found" if mounted and mounted.zeros_lost else ""
+        left = f"{registration.rms_mm:.4g} mm rms, {registration.max_mm:.4g} mm at most"
         notes += [
-            f"measured positions registered to the commanded ones at {registration.points} points: {residual}; the "
-            "remaining rigid motion is fitted with the calibration"
+            f"measured positions registered to the commanded ones at {registration.points} points: distance in space "
+            f"after registration{zeros} {left}, errors of the robot's geometry included, which the calibration "
+            "fits with the remaining rigid motion"
         ]
     if not (mounted and mounted.zeros_lost):
         notes += _large_error_notes(sheet)
@@ -128,6 +129,8 @@ def _refuse_gross_error(sheet: Sheet, unit_stated: bool) -> list[str]:
         _refuse(sheet, gross, driven)
     if contradiction is None:
         return []
+    if not np.isfinite(contradiction.off_mm):
+        return [f"the nominal robot has too few poses at the {sheet.drive_name} to compare the commanded positions"]
     off = f"commanded positions {contradiction.off_mm:.3g} mm in the median from those of the nominal robot at the "
     off += sheet.drive_name
     if contradiction.refused:

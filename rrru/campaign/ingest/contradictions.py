@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from rrru.campaign import measurements as rows
 from rrru.campaign.ingest.checks import resolution
-from rrru.campaign.ingest.gross_advice import of_drives
+from rrru.campaign.ingest.gross_advice import of_drives, shifted_words
 from rrru.campaign.ingest.gross_file import GrossFile
 from rrru.campaign.ingest.mistakes import Mistakes, all_orders_and_signs
 from rrru.campaign.ingest.registration import register
@@ -208,10 +208,10 @@ def _in_words(file: GrossFile, mistakes: Mistakes) -> str:
     """Text: what to write into the configuration or to correct in the file."""
     texts, spec = [*of_drives(file, mistakes)], file.spec
     if mistakes.shift:
-        side, count = ("late", mistakes.shift) if mistakes.shift > 0 else ("early", -mistakes.shift)
-        texts.append(f"commanded columns that are not {count} row{'s' * (count > 1)} {side}")
+        texts.append(shifted_words("commanded", mistakes.shift))
     if mistakes.unit and mistakes.unit != mistakes.drive_unit:
-        texts.append(f"commanded columns in {spec.unit}: they are in {mistakes.unit}")
+        factor = MM[mistakes.unit] / MM[spec.unit]
+        texts.append(f"commanded columns in {spec.unit}: they are in {mistakes.unit}, multiply them by {factor:.6g}")
     elif mistakes.unit:
         texts.append(f"unit: {mistakes.unit}")
     if mistakes.drive_unit and mistakes.unit != mistakes.drive_unit:

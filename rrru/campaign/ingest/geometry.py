@@ -47,11 +47,19 @@ def _check_poses(known, command, sheet):
 
     For a robot that can orient its platform the commanded positions alone do not determine the drive values.
     """
-    back = sheet.mechanism.forward(known[[*sheet.drives]].to_numpy(), guess_mm=command)
-    off, limit = np.linalg.norm(back - command, axis=1), frame_limit(sheet.mechanism)
-    if not np.median(off) <= limit:
-        value = f"{sheet.drive_name} that bring the nominal robot {np.median(off):.6g} mm from there in the median"
-        advice = "see that `robot`, its zero positions, its frame and its tool, unit and angle_unit belong to the file"
+    values = known[[*sheet.drives]].to_numpy()
+    # blank drive values are a problem of their own
+    whole = np.isfinite(values).all(axis=1)
+    back = sheet.mechanism.forward(values[whole], guess_mm=command[whole])
+    off, limit = np.linalg.norm(back - command[whole], axis=1), frame_limit(sheet.mechanism)
+    posed = np.isfinite(off)
+    advice = "see that `robot`, its zero positions, its frame and its tool, unit and angle_unit belong to the file"
+    if posed.sum() < _MANY * len(off):
+        where = f"in {len(off) - posed.sum()} of {len(off)} rows"
+        value = f"{sheet.drive_name} at which the nominal robot has no pose {where}"
+        sheet.note("angles", COMMAND, value, f"values at which it closes; {advice}")
+    elif len(off) and (median := np.median(off[posed])) > limit:
+        value = f"{sheet.drive_name} that bring the nominal robot {median:.6g} mm from there in the median"
         sheet.note("angles", COMMAND, value, f"at most {limit:.4g} mm; {advice}")
     return True
 

@@ -7,6 +7,7 @@ import numpy as np
 from rrru.campaign.ingest.gross_file import GrossFile, Hypothesis
 from rrru.campaign.ingest.mistakes import Mistakes
 from rrru.campaign.ingest.sheet import MEASURED, position_text
+from rrru.campaign.ingest.spec import MM
 
 # an axis of the instrument equals one of the robot's where its component along that axis is more than this
 _ALONG_AN_AXIS = 0.95
@@ -19,13 +20,21 @@ def advice(file: GrossFile, found: Hypothesis) -> str:
     mistakes = found.mistakes
     texts = [*of_drives(file, mistakes), *_of_units(file, mistakes)]
     if mistakes.shift:
-        side, count = ("late", mistakes.shift) if mistakes.shift > 0 else ("early", -mistakes.shift)
-        texts.append(f"measured columns that are not {count} row{'s' * (count > 1)} {side}")
+        texts.append(shifted_words("measured", mistakes.shift))
     if mistakes.free:
         texts.append(_of_targets(file, found))
     if mistakes.mirrored:
         texts.append(f"a right-handed frame: {_of_axes(file, found.rotation)}")
     return " and ".join(texts)
+
+
+def shifted_words(which: str, shift: int) -> str:
+    """What to do where columns are so many rows late, or early for a negative number."""
+    count = f"{abs(shift)} row{'s' * (abs(shift) > 1)}"
+    (side, way, end) = ("late", "up", "last") if shift > 0 else ("early", "down", "first")
+    deleted = "row" if abs(shift) == 1 else count
+    move = f"move their values {way} by {count} in each run, leave all other columns, and delete its {end} {deleted}"
+    return f"{which} columns that are not {count} {side}: {move}"
 
 
 def of_drives(file: GrossFile, mistakes: Mistakes) -> Iterator[str]:
@@ -47,7 +56,9 @@ def _of_units(file: GrossFile, mistakes: Mistakes) -> Iterator[str]:
     spec = file.spec
     unit, drive_unit = spec.unit, mistakes.drive_unit or spec.unit_of_drives
     if mistakes.unit and _commands_are_right(file, mistakes):
-        yield f"measured columns in {spec.unit}, as the commanded ones: they are in {mistakes.unit}"
+        factor = f"multiply them by {MM[mistakes.unit] / MM[spec.unit]:.6g}"
+        both = f"`unit: {mistakes.unit}` is for a file whose commanded columns are in {mistakes.unit}, too"
+        yield f"measured columns in {spec.unit}, as the commanded ones: they are in {mistakes.unit}, {factor} ({both})"
     elif mistakes.unit:
         unit = mistakes.unit
         yield f"unit: {unit}"

@@ -52,7 +52,7 @@ def register_sheet(sheet: Sheet, mounted: Mounting | None, digit_mm: float) -> R
         )
         sheet.refuse_now(MEASURED, value, "a right-handed frame: reverse the sign of one axis")
     if result.rms_mm > (limit := frame_limit(sheet.mechanism)):
-        value = f"a residual of {result.rms_mm:.6g} mm rms after registration at {result.points} points"
+        value = f"distances in space of {result.rms_mm:.6g} mm rms after registration at {result.points} points"
         sheet.refuse_now(MEASURED, value, f"at most {limit:g} mm rms: the same points in both frames")
     return result
 

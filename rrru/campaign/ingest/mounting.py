@@ -103,8 +103,8 @@ def mounting(sheet):
         turn = _between(poses, rows.turns(frame, "measured"), rotation)
         _refuse_scattered(sheet, poses, rotation)
         if registered:
-            vector = Rotation.from_matrix(turn).as_rotvec()
-            notes += (f"orientations are read turned by {np.linalg.norm(vector):.4g} rad from the platform's",)
+            angle_deg = np.degrees(Rotation.from_matrix(turn).magnitude())
+            notes += (f"orientations are read turned by {angle_deg:.4g} degrees from the platform's",)
         else:
             _check_turned(sheet, turn)
             turn = np.eye(3)
@@ -187,9 +187,13 @@ def _in_words(sheet, zeros, left_mm):
 
 def check_turned(sheet):
     """Note orientations in another frame than the robot's, in a sheet that has some and no Mounting."""
-    if set(TURNS["measured"]) <= set(sheet.frame):
+    if not set(TURNS["measured"]) <= set(sheet.frame):
+        return
+    turns = rows.turns(sheet.frame, "measured")
+    # a file without a pose to compare has other problems, which are noted
+    if (sheet.poses.closed & np.isfinite(turns).all(axis=(1, 2))).any():
         _refuse_scattered(sheet, sheet.poses, np.eye(3))
-        _check_turned(sheet, _between(sheet.poses, rows.turns(sheet.frame, "measured"), np.eye(3)))
+        _check_turned(sheet, _between(sheet.poses, turns, np.eye(3)))
 
 
 def _refuse_scattered(sheet, poses, rotation):

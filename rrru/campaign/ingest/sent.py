@@ -13,7 +13,8 @@ def sent_to(frame, mechanism, problems):
     _check_end_effectors(frame, mechanism, problems)
     values = frame[drives].to_numpy(dtype=float)
     position = mechanism.forward(values, guess_mm=mechanism.guess(values, frame.get("target")))
-    for i in np.flatnonzero(np.isnan(position).any(axis=1)):
+    # blank drive values are a problem of their own
+    for i in np.flatnonzero(np.isnan(position).any(axis=1) & np.isfinite(values).all(axis=1)):
         value = ", ".join(f"{one:.6g}" for one in frame[drives].iloc[i])
         allowed = "values at which the nominal robot closes near its home pose, or commanded positions besides them"
         problems.add("no pose", row=frame.index[i], column=", ".join(drives), value=value, allowed=allowed)

@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 
 from rrru.campaign import measurements as rows
+from rrru.campaign.stated_motion import rests
 from rrru.diagnosis.correction.corrected_file import corrected
 from rrru.diagnosis.correction.drive_table import corrected_drives
 from rrru.diagnosis.correction.file_error import FileModel, file_error
@@ -46,7 +47,7 @@ def write_corrected(diagnosis, section, masses, file, seed=0):
         worth = {
             "file_error_mm": error.measured_mm,
             "file_error_fresh_mm": error.fresh_mm,
-            "file_remainder": _remainder(shrink, more, written, error),
+            "file_remainder": _remainder(shrink, more, written, error, inference.case),
             "file_headline": _headline(written, error),
         }
         shrink, lost = pd.concat([shrink, more], ignore_index=True), written.not_in_model
@@ -75,19 +76,37 @@ def _refuse_worse(more):
         )
 
 
-def _remainder(shrink, more, written, error):
+def _remainder(shrink, more, written, error, case):
     """Residual error of a corrected file beyond that of the diagnosis, in words, empty where negligible.
 
-    written: the Corrected file; error: its FileError.
+    written: the Corrected file; error: its FileError; case: the DiagnosisProblem, whose readings it holds for.
     """
     left, whole = _left_mm(more, "corrected_model"), _left_mm(shrink, "held_out")
     if written.lacking:
         names = ", ".join(map(readable, written.lacking))
-        left_mm = np.nanmax([error.measured_mm, error.fresh_mm])
-        return f"this {_holds(written)} and not {names}: {left_mm:.2g} mm rms remain; use corrected_drives"
+        known = [size for size in (error.measured_mm, error.fresh_mm) if np.isfinite(size)]
+        size = f": {max(known):.2g} mm rms remain {_conditions(case)}" if known else ""
+        return f"this {_holds(written)} and not {names}{size}; use corrected_drives"
     if not left > OPTIONS.max_file_remainder_ratio * whole:
         return ""
     return f"this file leaves {left:.2g} mm rms at the readings, the diagnosis {whole:.2g} mm; use corrected_drives"
+
+
+def _conditions(case):
+    """Poses, payloads, speeds and temperatures of the readings in use, in words: a residual error holds for these."""
+    frame = case.measurements[case.used]
+    moved = "robot at rest" if rests(frame) else _range(frame, "speed_mm_s", "speed", "mm/s")
+    loads = (_range(frame, "payload_kg", "payload", "kg"), moved, _range(frame, "temperature_c", "temperature", "°C"))
+    return f"at poses and loads like those measured ({', '.join(loads)})"
+
+
+def _range(frame, column, word, unit):
+    """The range of a column in words, "unknown" where nothing was recorded."""
+    values = frame[column].dropna() if column in frame else ()
+    if not len(values):
+        return f"{word} unknown"
+    low, high = f"{values.min():.3g}", f"{values.max():.3g}"
+    return f"{word} {low if low == high else f'{low} to {high}'} {unit}"
 
 
 def _holds(written):
@@ -136,7 +155,7 @@ def gap_rows(inference, corrected, section, file, shrink):
             for (_, robot, _), one in zip(models, files, strict=True)
         ]
     except (ConfigError, SimulationError, UnreachableError) as error:
-        why = f"corrected model not driven: {error}; closed at its drive values instead"
+        why = f"corrected model not driven, but closed at its drive values, since {error}"
         poses = [_closed(inference.case, robot, effects) for _, robot, effects in models]
     result, case = [], inference.case
     known = case.on_robot & case.complete({term.effect for term in inference.fit.terms})

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import yaml
 
+from rrru.campaign import measurements as rows
 from rrru.campaign.ingest.columns import REQUIRED, resolve
 from rrru.campaign.ingest.problems import Problems
 from rrru.campaign.ingest.sheet import COMMAND, position_text
@@ -15,7 +16,7 @@ from rrru.campaign.ingest.spec import IngestSpec
 from rrru.campaign.stated_motion import STOP_AND_GO
 from rrru.errors import ConfigError, IngestError
 from rrru.pipeline.config import own_robot
-from rrru.pipeline.data_check.costs import costs, without_times
+from rrru.pipeline.data_check.costs import costs, enough_poses, without_times
 from rrru.pipeline.data_check.propose import fitting_robots, propose
 
 _SHOWN = 8
@@ -27,6 +28,7 @@ _UNFINISHED = (
 # values that only the user knows, with an example
 _UNREADABLE = {
     "noise_mm": "0.02  # of the instrument, 1 sigma per axis; without it, it is read from the file or estimated",
+    "noise_rad": "1.0e-4  # of measured orientations, 1 sigma per axis, in rad; without it, it is estimated",
     "platform_mass_kg": "3.0  # mass of platform or tool, without payload_kg",
 }
 # motion of a robot that stops, which only the user knows
@@ -42,12 +44,13 @@ class Check:
     """The result for a file.
 
     section: the proposed section of the campaign; lines: the report; refused: the remaining problems, empty where
-    ingest accepts the file.
+    ingest accepts the file; turned: whether it has measured orientations.
     """
 
     section: dict
     lines: tuple[str, ...]
     refused: tuple[dict, ...] = ()
+    turned: bool = False
 
     @property
     def overlay(self):
@@ -80,13 +83,21 @@ def check_file(file, config, robot=None, commands=None):
     if result is None:
         if lines[-1].startswith("missing:") and "time_s" in lines[-1]:
             lines += [f"cost: {one}" for one in without_times(config, mechanism)]
+        lines.append(f"cost: {enough_poses(mechanism)}")
         fitting = fitting_robots(given, config)
         if fitting and given["robot"] not in fitting:
             lines.append(f"wrong robot? {given['robot']} does not fit this file, {' and '.join(fitting)} would")
     else:
-        lines += [f"note: {note}" for note in result.notes]
+        lines += [f"note: {_proposed(note) if 'motion' not in given else note}" for note in result.notes]
         lines += [f"cost: {one}" for one in costs(result.measurements, config, section)]
-    return Check(section, tuple(lines), found.refused)
+    turned = result is not None and rows.has_turns(result.measurements)
+    return Check(section, tuple(lines), found.refused, turned)
+
+
+def _proposed(note):
+    """A note that says of a proposed `motion` that it is proposed, not stated."""
+    why = "proposed, since several reflectors are read at a stop or the points follow no path; see that it is right"
+    return note.replace(", as stated", f": {why}") if note.startswith("motion: ") else note
 
 
 def _content(section, cells):
@@ -123,11 +134,10 @@ def _used(section, cells, mechanism):
 def _meant(found, mechanism):
     """Reference points of commanded positions and payloads."""
     tool = f"the tool, {position_text(mechanism.tool_mm)} on the platform"
-    if set(COMMAND) <= set(found):
-        others = ", whatever target a row is of" if "target" in found else ""
-        yield f"meant: commanded positions are of {tool}{others}"
-    if "payload_kg" in found:
-        yield f"meant: payload_kg hangs at {tool}"
+    others = ", whatever target a row is of" if "target" in found else ""
+    commands = "commanded positions" if set(COMMAND) <= set(found) else "command_*_mm, computed from the drive values,"
+    yield f"meant: {commands} are of {tool}{others}"
+    yield f"meant: payload_kg{'' if 'payload_kg' in found else ', where you add it,'} hangs at {tool}"
 
 
 def print_check(file, config, robot=None, commands=None, overlays=()):
@@ -161,7 +171,8 @@ def _pasted(found, robots):
             for flow in (None if isinstance(value, dict | list) else False, False)
         )
         lines += [f"    {line}" for line in (short if len(short) < _WIDE else long).splitlines()]
-    lines += [f"    # {key}: {words}" for key, words in _UNREADABLE.items() if key not in found.section]
+    open_keys = [key for key in _UNREADABLE if key not in found.section and (key != "noise_rad" or found.turned)]
+    lines += [f"    # {key}: {_UNREADABLE[key]}" for key in open_keys]
     if found.section.get("motion") == STOP_AND_GO:
         lines.append(f"    # {_BETWEEN}")
     return "\n".join(lines)

@@ -3,6 +3,7 @@
 import numpy as np
 
 from rrru.campaign import measurements as rows
+from rrru.campaign.driven_path import passes_points
 from rrru.campaign.noise import ENOUGH_REPEATS, read_noise, repeat_noise
 from rrru.diagnosis.determined import poses_needed, require_determined
 from rrru.diagnosis.diagnose import with_wide_bounds
@@ -60,6 +61,16 @@ def _poses(case):
     return f"{read} poses are read; their {rank} identifiable parameters need at least {needed}, with {spare}"
 
 
+def enough_poses(mechanism):
+    """Sentence on the number of poses of one reflector that are enough for all parameters of a robot."""
+    count = len(mechanism.parameters)
+    poses = -(-(count + OPTIONS.min_spare_numbers) // 3)
+    spare = f"{OPTIONS.min_spare_numbers} degrees of freedom to spare"
+    return (
+        f"about {poses} poses of one reflector are enough for the {count} parameters of {mechanism.name}, with {spare}"
+    )
+
+
 def without_times(config, mechanism):
     """Sentences on effects of a robot that are not testable in a file without times."""
     library = GapSettings.from_config(config["gap"]).library(mechanism)
@@ -112,10 +123,21 @@ def _passes(measurements, section):
         yield "no place is measured in two runs: drift is confounded with effects of the place; repeat a run"
     stated = "noise_mm" in section or read_noise(measurements) is not None
     if not stated and repeat_noise(measurements)[1] < ENOUGH_REPEATS:
-        yield "noise_mm is not stated and hardly a point is repeated: rough errors along the runs count as noise"
+        yield _estimated_noise(measurements)
     if measurements["payload_kg"].nunique() < 2:
         mass = "" if "platform_mass_kg" in section else "; platform_mass_kg is not stated"
         yield f"one payload: compliance shows under the robot's own weight only{mass}"
+
+
+def _estimated_noise(measurements):
+    """Sentence on what counts as noise where it is neither stated nor determined by repeated points."""
+    repeats = repeat_noise(measurements)[1] // 3
+    needed = -(-ENOUGH_REPEATS // 3)
+    found = f"{repeats} readings repeat an earlier one (same trajectory, pose, direction, speed and payload)"
+    rough = "errors that change from point to point along the runs count as noise"
+    if not passes_points(measurements):
+        rough = "the poses follow no path, so that systematic errors of the calibrated robot count as noise"
+    return f"noise_mm is not stated and {found}, where {needed} would determine it: {rough}; state noise_mm"
 
 
 def _readings(measurements, robot, section):

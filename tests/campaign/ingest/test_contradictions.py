@@ -52,9 +52,10 @@ def test_what_makes_both_agree_is_named(name):
     mixed = frame.assign(**{one: frame[drives[k]] for one, k in zip(drives, order, strict=True)})
     assert _advice(mixed, robot) == f"order: [{', '.join(drives[k] for k in order)}]"
     late = frame.assign(**rows.vector_columns("command", np.roll(command, 1, axis=0))).iloc[1:]
-    assert _advice(late, robot) == "commanded columns that are not 1 row late"
+    moved = "move their values up by 1 row in each run, leave all other columns, and delete its last row"
+    assert _advice(late, robot) == f"commanded columns that are not 1 row late: {moved}"
     metres = frame.assign(**rows.vector_columns("command", command / 1000.0))
-    assert _advice(metres, robot) == "commanded columns in mm: they are in m"
+    assert _advice(metres, robot) == "commanded columns in mm: they are in m, multiply them by 1000"
     unit, zero = robot.parts.units[1], {"rad": 0.05, "mm": 2.0}[robot.parts.units[1]]
     moved = _advice(frame.assign(**{drives[1]: frame[drives[1]] + zero}), robot)
     assert f"adding {-zero:g} {unit} to {drives[1]} makes both agree" in moved

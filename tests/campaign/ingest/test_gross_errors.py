@@ -38,6 +38,17 @@ def _made(seed, kind=_arm):
     return robot, pd.DataFrame(columns).assign(trajectory="poses", target="ball")
 
 
+_MOVED = "move their values {} by {} in each run, leave all other columns, and delete its {}"
+
+
+def test_moving_late_rows_as_advised_leaves_no_mistake():
+    robot, frame = _made(0, _arm)
+    late = _shifted(frame, 1)
+    measured = [f"measured_{axis}_mm" for axis in "xyz"]
+    moved = late.assign(**{name: late[name].shift(-1) for name in measured}).iloc[:-1]
+    assert find_gross_error(late, _SPEC, robot) is not None and find_gross_error(moved, _SPEC, robot) is None
+
+
 def _shifted(frame, by):
     """The frame with measured columns that are late by so many rows."""
     measured = rows.measured(frame)
@@ -57,8 +68,9 @@ def test_every_mistake_is_named(kind, seed):
     order[one], order[other] = drives[other], drives[one]
     exchanged = frame.assign(**{drives[one]: frame[drives[other]], drives[other]: frame[drives[one]]})
     named[f"order: [{', '.join(order)}]"] = exchanged
-    named["measured columns that are not 1 row late"] = _shifted(frame, 1)
-    named["measured columns that are not 2 rows early"] = _shifted(frame, -2)
+    named[f"measured columns that are not 1 row late: {_MOVED.format('up', '1 row', 'last row')}"] = _shifted(frame, 1)
+    early = _MOVED.format("down", "2 rows", "first 2 rows")
+    named[f"measured columns that are not 2 rows early: {early}"] = _shifted(frame, -2)
     mirror = rows.measured(frame) * [1.0, -1.0, 1.0]
     named["a right-handed frame: columns: {measured_x_mm: measured_y_mm, measured_y_mm: measured_x_mm}"] = frame.assign(
         **rows.vector_columns("measured", mirror)

@@ -1,6 +1,7 @@
 """Files of poses and of several reflectors, with joints alone, in an instrument's own frame; refusals."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -11,7 +12,10 @@ from rrru.calibration.calibrate import calibrate
 from rrru.calibration.campaign_fit import select
 from rrru.calibration.campaign_noise import campaign_noise
 from rrru.campaign import measurements as rows
+from rrru.campaign.ingest import geometry
 from rrru.campaign.ingest.campaign_file import IngestSpec, ingest
+from rrru.campaign.ingest.problems import Problems
+from rrru.campaign.ingest.sheet import Sheet
 from rrru.diagnosis.diagnose import MeasuredRobot, diagnose
 from rrru.errors import IngestError
 from rrru.kinematics.base_parameters import direction
@@ -91,6 +95,36 @@ def test_poses_of_joints_alone_are_brought_into_the_robots_frame(arm, driven, tm
     np.testing.assert_allclose(rows.command(table), poses.point(np.asarray(arm.tool_mm)), atol=1e-9)
     np.testing.assert_allclose(rows.vectors(table, "target"), np.tile(_SPOTS["a"], (len(table), 1)), atol=1e-6)
     assert table["run"].eq(1).all() and any("follow no path" in note for note in found.notes)
+
+
+@pytest.mark.parametrize("frame", ["register", "robot"])
+@pytest.mark.parametrize("commanded", [False, True])
+@pytest.mark.parametrize("blank", [1, 100, 150])
+def test_blank_drive_values_are_named_once_and_no_message_has_a_nan(arm, driven, frame, commanded, blank, tmp_path):
+    table = _file(arm, driven, noise=0.0)
+    if commanded:
+        tool = arm.solve(driven, np.tile(arm.legs.home_mm, (len(driven), 1))).point(np.asarray(arm.tool_mm))
+        table = table.assign(**rows.vector_columns("command", tool))
+    table.loc[: blank - 1, arm.parts.columns[2]] = np.nan
+    with pytest.raises(IngestError) as caught:
+        _taken(tmp_path, table, arm, frame=frame)
+    assert not re.search(r"\b(nan|inf)\b", str(caught.value))
+    if frame == "robot":
+        # measured positions in another frame are named, too
+        return
+    # the line that counts them has no column
+    assert {problem["column"] for problem in caught.value.problems} - {None} == {arm.parts.columns[2]}
+
+
+def test_drive_values_without_a_pose_are_counted_where_there_are_commands(arm, driven, tmp_path, monkeypatch):
+    tool = arm.solve(driven, np.tile(arm.legs.home_mm, (len(driven), 1))).point(np.asarray(arm.tool_mm))
+    sheet = Sheet(None, arm, Problems("file"), {}, pd.DataFrame(dict(zip(arm.parts.columns, driven.T, strict=True))))
+    sheet = replace(sheet, frame=sheet.frame.assign(**rows.vector_columns("command", tool)))
+    nowhere = np.where(np.arange(len(driven))[:, None] < 100, np.nan, tool)
+    monkeypatch.setattr(type(arm), "forward", lambda *_, **__: nowhere)
+    geometry.check_commands(sheet)
+    with pytest.raises(IngestError, match="at which the nominal robot has no pose in 100 of 150 rows"):
+        sheet.problems.refuse()
 
 
 def test_deviations_are_found_beside_frame_tool_and_noise(arm, driven, tmp_path):

@@ -385,7 +385,7 @@ ROWS = {
         None,
         XYZ,
         "a nominal robot that is off by",
-        "measured columns in mm, as the commanded ones: they are in m, which",
+        "measured columns in mm, as the commanded ones: they are in m, multiply them by 1000 (`unit: m` is for",
     ),
     "measured in inches only": (
         columns(MEASURED, 1 / 25.4),
@@ -393,7 +393,7 @@ ROWS = {
         None,
         XYZ,
         "a nominal robot that is off by",
-        "measured columns in mm, as the commanded ones: they are in inch, which",
+        "measured columns in mm, as the commanded ones: they are in inch, multiply them by 25.4 (`unit: inch` is for",
     ),
     "degrees as radians": (
         columns(THETA, 180 / np.pi),

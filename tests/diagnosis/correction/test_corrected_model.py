@@ -132,7 +132,9 @@ def test_what_a_urdf_cannot_hold_is_named_and_left_in_its_gap(arm):
     verdict = arm.found.verdict
     assert set(verdict["effects"].split("+")) == {"backlash", "encoder_eccentricity"}
     assert verdict["not_in_model"].startswith("encoder_eccentricity; backlash of axis1")
-    assert "corrected model not driven: a URDF has no actuators" in verdict["notes"]
+    assert (
+        "corrected model not driven, but closed at its drive values, since a URDF has no actuators" in verdict["notes"]
+    )
     after, resimulated = _rows(arm, "corrected_model"), _rows(arm, "resimulated")
     assert resimulated["rms_mm"] < 1.2 * np.sqrt(3.0) * _NOISE_MM
     assert 3.0 * resimulated["rms_mm"] < after["rms_mm"] < _rows(arm, "given_model")["rms_mm"]
@@ -270,7 +272,10 @@ def test_a_file_that_is_no_better_than_the_one_that_came_is_not_offered(attached
 
 def test_what_a_corrected_file_leaves_beyond_the_diagnosis_is_said(arm, hexapod, attached):
     verdict = arm.found.verdict
-    left = float(re.search(r": (\S+) mm rms remain; use corrected_drives$", verdict["file_remainder"])[1])
+    speeds = arm.frame["speed_mm_s"]
+    loads = f"payload 0 kg, speed {speeds.min():.3g}( to {speeds.max():.3g})? mm/s, temperature unknown"
+    held = rf": (\S+) mm rms remain at poses and loads like those measured \({loads}\); use corrected_drives$"
+    left = float(re.search(held, verdict["file_remainder"])[1])
     assert verdict["file_remainder"].startswith(
         "this URDF holds the geometry only and not encoder eccentricity, backlash:"
     )

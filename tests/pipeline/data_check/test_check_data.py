@@ -11,6 +11,7 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from rrru import cli
+from rrru.campaign import measurements as rows
 from rrru.campaign.ingest.campaign_file import ingest
 from rrru.campaign.ingest.spec import IngestSpec
 from rrru.pipeline import config as parts
@@ -285,8 +286,14 @@ def test_several_targets_at_a_stop_and_poses_in_no_order_are_proposed_as_stop_an
     found = checked(shuffled, tmp_path)
     assert proposed(found)["motion"] == "stop_and_go" and not found.refused
     assert any("servo_lag" in line and "the robot rests at every point" in line for line in costs(found))
+    motion = [line for line in found.lines if line.startswith("note: motion: ")]
+    assert len(motion) == 1 and "proposed" in motion[0] and "as stated" not in motion[0]
+    (noise,) = [line for line in costs(found) if line.startswith("noise_mm is not stated")]
+    assert "0 readings repeat an earlier one" in noise and "where 10 would determine it" in noise
+    assert "the poses follow no path" in noise and "along the runs" not in noise
     stated = {"robot": "rrru3", "ingest": str(tmp_path / "mine.csv"), "motion": "continuous"}
-    assert proposed(checked(shuffled, tmp_path, campaigns={"mine": stated}))["motion"] == "continuous"
+    known = checked(shuffled, tmp_path, campaigns={"mine": stated})
+    assert proposed(known)["motion"] == "continuous" and "note: motion: continuous, as stated" in known.lines
     monkeypatch.chdir(ROOT)
     main([str(tmp_path / "mine.csv"), "--robot", "rrru3"])
     assert "# motion: {kind: stop_and_go, between: drives}" in capsys.readouterr().out
@@ -294,6 +301,24 @@ def test_several_targets_at_a_stop_and_poses_in_no_order_are_proposed_as_stop_an
     _two_targets(setup.mechanism({"name": "own", "dimensions": robot})).to_csv(file, index=False)
     taken = check_file(file, CONFIG | {"robots": CONFIG["robots"] | {"own": robot}}, "own")
     assert taken.refused == () and proposed(taken)["motion"] == "stop_and_go"
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_what_commands_and_payloads_mean_and_the_noise_of_orientations_are_named(turned, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(ROOT)
+    robot = {"mjcf": "data/models/hexapod.xml", "platform": "plate"}
+    frame = _two_targets(setup.mechanism({"name": "own", "dimensions": robot}))
+    if turned:
+        own = setup.mechanism({"name": "own", "dimensions": robot})
+        poses = own.solve(frame[[*own.parts.columns]].to_numpy(), np.tile(own.legs.home_mm, (len(frame), 1)))
+        frame = frame.assign(**rows.turn_columns("measured", poses.turn))
+    frame.to_csv(tmp_path / "stops.csv", index=False)
+    (tmp_path / "own.yaml").write_text(yaml.safe_dump({"robots": {"own": robot}}))
+    main([str(tmp_path / "stops.csv"), "--robot", "own", "--configfile", str(tmp_path / "own.yaml")])
+    text = capsys.readouterr().out
+    assert "whatever target a row is of" in text and "computed from the drive values" in text
+    assert "payload_kg, where you add it, hangs at the tool, (0, 0, 0) mm" in text
+    assert ("# noise_rad: " in text) == turned and ("poses are read; their" in text or "poses of one reflector" in text)
 
 
 def _two_targets(robot):

@@ -147,7 +147,7 @@ _CASES = [
         ({"name": "a", "place": "60.3, -0.5, ?", "about": "0.4"}, {}, _FACTS),
         ({"name": "a", "place": "60.3, -0.5, 43", "about": "0.4"}, {}, _FACTS),
     ),
-    ("orientations are turned", ({"value": "0.002"}, {}, _FACTS), ({"value": "1.57"}, {}, _FACTS)),
+    ("orientations are turned", ({"value": "0.11"}, {}, _FACTS), ({"value": "90"}, {}, _FACTS)),
     (
         "place of a cause",
         ({"name": "backlash", "place": " at q2"}, {}, _FACTS),
@@ -289,7 +289,7 @@ def _page(sentences=(), notes=(), read=()):
 
 def test_sentences_have_distinct_kinds():
     cause = (
-        "74 % of that (95 %: 60 % to 80 %) is encoder eccentricity at q3, amplitude3 = 0.000176 rad (95 %: 0.000148 "
+        "74 % of the gap (95 %: 60 % to 80 %) is encoder eccentricity at q3, amplitude3 = 0.000176 rad (95 %: 0.000148 "
         "to 0.000204), phase3 = phase4 = -0.59 rad (95 %: -0.79 to -0.39): the encoder's disc sits off its shaft's "
         "centre. It is largest for q3 at 30.0 degrees: 0.0002 rad (95 %: 0.0001 to 0.0003) off its mean over the "
         "measured range."

@@ -16,7 +16,7 @@ _Y = rf"(?P<other>{_NUMBER})"
 # a number with its unit, and its 95 % interval
 _ENDS = r" \(95 %: [^)]*\)"
 _SIZED = rf"{_X}(?: [^\s(]+)?(?P<ends>{_ENDS})"
-_SHARE = rf"(?P<share>{_NUMBER}) %(?: of that)?(?:{_ENDS})?"
+_SHARE = rf"(?P<share>{_NUMBER}) %(?: of the gap)?(?:{_ENDS})?"
 # text about a cause after its share or size
 _CAUSE = (
     r"(?P<name>[a-z ]+?)(?P<place> (?:in leg \d+|at [^,:]+?))?"
@@ -47,7 +47,7 @@ _SENTENCES = {
     "a cause without a share": rf"Also there is {_CAUSE}",
     "shares are not determined": r"The gap is too small relative to the noise: their shares .*",
     "the effects are confounded": r"The effects are confounded with each other: their shares .*",
-    "shares overlap": r"These shares overlap.*",
+    "shares overlap": r"These shares add up to more than the gap.*",
     "something is unexplained": rf"(?:Another|It is systematic, and no effect .*:) (?P<share>{_NUMBER}) % .*",
     "no cause is sure": r"No cause is probable enough to be named; .*",
     "the unexplained follows": r"The unexplained part follows .*",
@@ -58,9 +58,10 @@ _SENTENCES = {
     rf"answer: {_P}\.",
     "it does not repeat": rf"(?:{_SHARE}|Some of it) does not repeat from pass to pass.*",
     "it is random error": rf"(?:{_SHARE}|Some of it) is random error above the stated noise.*",
-    "what is left with it": rf"With (?:it|them) in the simulator the residual error on left-out runs is {_X} mm; "
+    "what is left with it": rf"With (?:it|them) in the simulator the residual error at left-out points is {_X} mm; "
     rf"the noise is {_Y} mm\.",
-    "these data cannot rule out": r"(?:These data cannot rule out|Parts of it could be): (?P<names>.*)\.",
+    "these data cannot rule out": r"(?:These data cannot rule out|Parts of the unexplained share could be): "
+    r"(?P<names>.*)\.",
     "next, a run": r"Next: (?:drive|measure) (?P<run>.*)\. That (?:decides|would help to decide) "
     r"(?P<contest>.*)\.",
     "next, none is advised": r"Next: no run is advised.*",
@@ -96,8 +97,8 @@ _NOTES = {
     "the file would be worse": rf"not corrected: its residual error would be {_X} mm rms, that of the file as it "
     rf"came is {_Y} mm",
     "the file is not corrected": r"not corrected: .*",
-    "how the file was driven": r"corrected model not driven: .*",
-    "a part of a sentence": r"closed at its drive values instead|allowed: .*|corrected_drives holds all .*"
+    "how the file was driven": r"corrected model not driven, but .*",
+    "a part of a sentence": r"allowed: .*|corrected_drives holds all .*"
     r"|an effect is found .*|the others are .*",
     "the file cannot hold play": r"backlash of (?P<names>.*)",
     "the file cannot hold compliance": r"compliance of (?P<names>.*)",
@@ -112,7 +113,7 @@ _READ = {
     r"to about (?P<about>\S+) mm(, its place along .* never turns)?",
     "a reflector is assumed": r"reflector (?P<name>\w+) assumed at \((?P<place>[^)]*)\) mm on the platform, "
     r"the mean of all at the tool: a platform that never turns does not determine it",
-    "orientations are turned": rf"orientations are read turned by {_X} rad from the platform's",
+    "orientations are turned": rf"orientations are read turned by {_X} degrees from the platform's",
     "zeros are lost": r"(zeros of|the zero of) (?P<count>\d+) drives? (are|is) lost, "
     rf"by {_X} (?P<unit>degrees|mm) at (?P<site>[^:]+): .*",
     "far from ordinary errors": rf"the nominal robot has an error of {_X} mm rms, {_Y} % of the robot's size of .*",

@@ -413,7 +413,7 @@ def _next_inspection(stated, truth, _facts):
 
 def _turned(stated, _truth, _facts):
     """The instrument's orientations are those of the platform, except the robot's own errors."""
-    return float(stated["value"]) <= _NEAR_TURN_RAD
+    return bool(np.radians(float(stated["value"])) <= _NEAR_TURN_RAD)
 
 
 def _undecided(_stated, _truth, _facts):
