@@ -492,6 +492,7 @@ _JUDGES = {
     "zeros are lost": _zeros_lost,
     "far from ordinary errors": _outliers,
     "points are outliers": _outliers,
+    "jumps are frequent": _undecided,
     "stale readings": _outliers,
     "undeclared columns": _outliers,
     "beyond a range": _outliers,
