@@ -132,6 +132,9 @@ def check(config):
     for name, section in config["campaigns"].items():
         if "virtual" in section:
             _check_virtual(config, name, section)
+        elif section.get("noise_mm") == 0.0:
+            allowed = "a positive number of mm; leave the key out where the noise is unknown, it is then estimated"
+            raise ConfigError(f"campaigns.{name}.noise_mm: 0, which no instrument reaches; allowed: {allowed}")
 
 
 def check_files(config):

@@ -21,7 +21,8 @@ def main(settings, inputs, outputs):
     measurements, masses = tables.read(inputs["measurements"]), Masses(**settings["masses"])
     nominal = setup.measured_robot(settings["robot"], measurements)
     noise = {key: settings[key] for key in ("noise_mm", "noise_rad", "noise_known")}
-    noise["noise_mm"] = noise["noise_mm"] or read_noise(measurements)
+    if noise["noise_mm"] is None:
+        noise["noise_mm"] = read_noise(measurements)
     limits = StatedLimits.from_config(settings["limits"])
     robot = MeasuredRobot(nominal, masses, campaign=settings["campaign"], limits=limits, **noise)
     chosen = GapSettings.from_config(settings["gap"], settings["seed"], settings["use_near_singularity"])

@@ -248,6 +248,7 @@ _ALWAYS = {"no commanded positions": True} | dict.fromkeys(
             "the mass is not as stated",
             "the base is tilted",
             "the noise is smaller",
+            "a noise of zero was stated",
             "far from ordinary errors",
             "points are outliers",
             "stale readings",

@@ -122,7 +122,7 @@ def diagnosed(wildcards):
         "campaign": wildcards.campaign,
         "robot": parts.robot(config, section),
         "masses": parts.masses(config, section),
-        "noise_mm": section.get("noise_mm") or None,
+        "noise_mm": section.get("noise_mm"),
         "noise_rad": section.get("noise_rad"),
         "noise_known": section.get("noise_known", False),
         "limits": parts.limits(config, section),

@@ -85,6 +85,7 @@ _NOTES = {
     "fitted without some points": r"(?P<names>[\w, ]+) fitted without (?P<lacking>\d+) of (?P<used>\d+) points, .*",
     "the noise is larger": rf"noise stated {_X} mm per axis, found {_Y}: the (?:robot does not|instrument is worse).*",
     "the noise is smaller": rf"noise stated {_X} mm per axis, found {_Y}: the instrument is better",
+    "a noise of zero was stated": rf"noise_mm is 0, which no instrument reaches: the noise is estimated, {_X} mm .*",
     "repeatability is unknown": r"repeatability is unknown: no pose was measured twice",
     "an effect needs what is not there": r"(?P<name>\w+) not tested: needs (?P<needs>[\w, ]+), which the columns .*",
     "an effect needs different values": r"(?P<name>\w+) not tested: needs (?P<needs>[\w, ]+) of more than one value",

@@ -468,6 +468,7 @@ _JUDGES = {
     "fitted without some points": lambda stated, t, _: int(stated["lacking"]) < int(stated["used"]) <= t.rows,
     "the noise is larger": _noise_larger,
     "the noise is smaller": lambda *_: False,
+    "a noise of zero was stated": lambda *_: False,
     "repeatability is unknown": _unmeasured_again,
     "an effect needs what is not there": _needs,
     "an effect needs different values": _needs_different,
