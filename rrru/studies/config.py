@@ -7,7 +7,7 @@ import hashlib
 from pathlib import Path
 
 from rrru.errors import ConfigError
-from rrru.plugins import module_file
+from rrru.plugins import module_file, own_code_digest
 
 # keys of a campaign's section that only drive it, or limit further runs
 _DRIVEN = ("trajectories", "passes", "advised_by", "limits")
@@ -37,6 +37,8 @@ def robot(config, section):
     own = own_robot_file(dimensions)
     # the user's own robot changes with its file
     digest = {"digest": hashlib.sha256(own.read_bytes()).hexdigest()} if own and own.is_file() else {}
+    if "module" in dimensions:
+        digest = {"digest": own_code_digest([dimensions["module"]])}
     chosen = {"name": name, "dimensions": dimensions, "parameter_set": section.get("errors"), **digest}
     if "targets" in section:
         chosen["targets"] = sorted(section["targets"])
@@ -102,16 +104,31 @@ def virtual(config, name):
     section = config["campaigns"][name]
     if "virtual" not in section:
         return None
+    real = config["virtual_robots"][section["virtual"]]
+    own = own_effects(real)
     return {
         "name": name,
         "seed": config["seed"],
-        "robot": config["loads"] | config["virtual_robots"][section["virtual"]],
+        # the user's own effects change with their code
+        **({"digest": own_code_digest(own)} if own else {}),
+        "robot": config["loads"] | real,
         "trajectories": config["trajectories"][section["trajectories"]],
         "passes": section.get("passes", [{"reverse": False, "payload_kg": 0.0}]),
         "motion": config["motion"],
         "noise_mm": section["noise_mm"],
         **{key: section[key] for key in ("targets", "noise_rad") if key in section},
     }
+
+
+def own_effects(section):
+    """Names `module:object` of the user's own effects in all lists and mappings of effects below a section, sorted."""
+    found = set()
+    for key, value in section.items():
+        if key.endswith("effects") and isinstance(value, list | dict):
+            found |= {name for name in value if ":" in str(name)}
+        elif isinstance(value, dict):
+            found |= set(own_effects(value))
+    return sorted(found)
 
 
 def masses(config, section):
