@@ -123,8 +123,8 @@ def _with_known(effect, values):
     for key, value in values.items():
         one = effect.parameters[key]
         if not one.low <= value <= one.high:
-            allowed = f"{one.low:g} to {one.high:g}"
-            raise ConfigError(f"gap.known: {effect.name}.{key} is {value} {one.unit}; allowed: {allowed}")
+            allowed = f"{one.low:g} to {one.high:g}" + f" {one.unit}" * (one.unit != "1")
+            raise ConfigError(f"gap.known: {effect.name}.{key} is {value:g}; allowed: {allowed}")
     fixed = dict.fromkeys(tuple((dict(shape) | dict(values)).items()) for shape in coordinates.shapes)
     shapes = tuple(map(dict, fixed))
     # where all parameters are known none is fitted
