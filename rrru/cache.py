@@ -1,6 +1,7 @@
 """Caches of the latest results."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import fields, is_dataclass
 from functools import wraps
 from typing import Any, TypeVar, cast
 
@@ -12,32 +13,56 @@ _Answer = TypeVar("_Answer")
 
 
 def last_cached(method: Callable[[_Owner, Any], _Answer]) -> Callable[[_Owner, Any], _Answer]:
-    """Cache the last result of a method of one array: a search needs derivatives where it just needed residuals."""
-    name = f"_last_{method.__name__}"
+    """Cache the last result of a method of one array: a search needs derivatives where it just needed residuals.
+
+    The method gets a copy of the array. Arrays of the result are read-only: all callers share them.
+    """
+    name = _key(method)
 
     @wraps(method)
     def cached(self: _Owner, array: npt.ArrayLike) -> _Answer:
-        array = np.asarray(array, dtype=float)
+        array = np.array(array, dtype=float)
         asked = array.shape, array.tobytes()
         if self.__dict__.get(name, (None,))[0] != asked:
-            self.__dict__[name] = asked, method(self, array)
+            self.__dict__[name] = asked, read_only(method(self, array))
         return cast(_Answer, self.__dict__[name][1])
 
     return cached
 
 
 def last_cached_of(method: Callable[[_Owner, Any], _Answer]) -> Callable[[_Owner, Any], _Answer]:
-    """Cache the last result of a method of one object that never changes."""
-    name = f"_last_{method.__name__}"
+    """Cache the last result of a method of one object that never changes; arrays of the result are read-only."""
+    name = _key(method)
 
     @wraps(method)
     def cached(self: _Owner, asked: Any) -> _Answer:
         last = self.__dict__.get(name)
         if last is None or last[0] is not asked:
-            last = self.__dict__[name] = asked, method(self, asked)
+            last = self.__dict__[name] = asked, read_only(method(self, asked))
         return cast(_Answer, last[1])
 
     return cached
+
+
+def _key(method: Callable[..., Any]) -> str:
+    """Where an object stores the result: a method and the one of a base class that it overrides have a place each."""
+    return f"_last_{method.__module__}.{method.__qualname__}"
+
+
+def read_only(answer: _Answer) -> _Answer:
+    """A result whose arrays cannot be changed in place, those in tuples, mappings and dataclasses included."""
+    if isinstance(answer, np.ndarray):
+        answer.flags.writeable = False
+    elif isinstance(answer, tuple | list):
+        for part in answer:
+            read_only(part)
+    elif isinstance(answer, Mapping):
+        for part in answer.values():
+            read_only(part)
+    elif is_dataclass(answer):
+        for one in fields(answer):
+            read_only(getattr(answer, one.name))
+    return answer
 
 
 class Latest:

@@ -17,6 +17,7 @@ from rrru.campaign.outliers import robust_sd
 from rrru.errors import FitError
 from rrru.estimation.estimate import Estimate
 from rrru.estimation.explain import explain_end
+from rrru.estimation.observations.target_positions import TargetPositions
 from rrru.estimation.parameters import Block, Parameters
 from rrru.estimation.problem import Problem, WhiteNoise
 from rrru.estimation.solver import SolverOptions, estimate_at, solve
@@ -98,7 +99,7 @@ class Calibration:
     @cached_property
     def readings(self) -> Readings | None:
         """The Readings besides positions of the tool; distances, heights and the like have none."""
-        return getattr(self.observations, "readings", None)
+        return self.observations.readings if isinstance(self.observations, TargetPositions) else None
 
     @property
     def _position_residual_mm(self) -> FloatArray:

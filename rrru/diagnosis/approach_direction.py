@@ -135,4 +135,4 @@ def estimate_approach(case, state, responses):
 
 def has_direction(effect):
     """Whether an effect depends on the sense in which the drives arrive."""
-    return PATH in getattr(effect, "needs", ())
+    return PATH in effect.needs

@@ -45,6 +45,7 @@ from rrru.diagnosis.state import State
 from rrru.diagnosis.validity import why_no_answer
 from rrru.diagnosis.variance_by_factor import worst_spot
 from rrru.diagnosis.verdict import Verdict, decide, without_answer
+from rrru.errors import ConfigError
 from rrru.estimation.noise_model import CONTRADICTED, NoiseModel
 from rrru.kinematics.dynamics import Masses
 from rrru.kinematics.robot import Robot
@@ -60,9 +61,10 @@ class MeasuredRobot:
     """What is known of the robot that a campaign was measured on.
 
     mechanism: its nominal one; masses: `rrru.kinematics.dynamics.Masses`; noise_mm: of the instrument, per axis, None
-    or 0 where it is not stated, and noise_rad: of the orientations that it reads; noise_known: noise_mm is exact,
-    not a guess within 30 %; campaign: name of the campaign, for its random stream; limits: of
-    further runs.
+    where it is not stated (0, of a simulation without noise, is estimated with a note), and noise_rad: of the
+    orientations that it reads; noise_known: noise_mm is exact, not a guess within 30 %; campaign: name of the campaign,
+    for its random stream; limits: of further runs. Raises ConfigError for a negative noise_mm, or a noise_rad that is
+    not positive.
     """
 
     mechanism: Robot
@@ -72,6 +74,12 @@ class MeasuredRobot:
     noise_rad: float | None = None
     noise_known: bool = False
     limits: StatedLimits = field(default_factory=StatedLimits)
+
+    def __post_init__(self) -> None:
+        if self.noise_mm is not None and not self.noise_mm >= 0.0:
+            raise ConfigError(f"noise_mm is {self.noise_mm}; allowed: a positive number, or None where it is unknown")
+        if self.noise_rad is not None and not self.noise_rad > 0.0:
+            raise ConfigError(f"noise_rad is {self.noise_rad}; allowed: a positive number, or None where it is unknown")
 
 
 @dataclass(frozen=True)

@@ -32,6 +32,9 @@ class Unknown:
     typical: float = 0.1
 
     drives: int = 3
+    # capabilities of an `rrru.effects.protocol.Effect` that no function has
+    along_drives = with_waves = None
+    switches = False
 
     @property
     def coordinates(self):

@@ -57,7 +57,7 @@ def with_spectra(case, linear, terms):
 
 def _is_pending(effect):
     """Whether an effect's waves are still to be found."""
-    return getattr(effect, "with_waves", None) is not None
+    return effect.with_waves is not None
 
 
 def _without(columns, basis):

@@ -85,7 +85,7 @@ def _by_weight(case, at, state, columns):
 
 def _columns(case, at, key, state):
     """Derivative (n, 3, c) by the coordinates of one effect: secants over their present or typical size."""
-    functions = getattr(case.library[key[0]], "along_drives", None)
+    functions = case.library[key[0]].along_drives
     if functions is not None:
         response = case.of_rows(at.drive_effect)
         made = (f[case.at][:, None, :] * response[:, :, k, None] for k, f in enumerate(functions(case.motion)))

@@ -153,7 +153,7 @@ class EffectModel:
         """Derivative (m, 3, k) of the model by a term's coefficients."""
         case, key = self.case, (term.effect, term.shape)
         effect, present = case.library[term.effect], state.effects[key]
-        if effect_functions := getattr(effect, "along_drives", None):
+        if effect_functions := effect.along_drives:
             response = case.of_rows(at.drive_effect)
             made = [
                 f[case.at][:, None, :] * response[:, :, k, None] for k, f in enumerate(effect_functions(case.motion))

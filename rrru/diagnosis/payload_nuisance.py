@@ -49,7 +49,7 @@ def nuisance_priors(motion, masses):
 
     All zero where no part has mass.
     """
-    robot, point_masses = motion.robot, getattr(motion.robot, "point_masses", ())
+    robot, point_masses = motion.robot, motion.robot.point_masses
     platform_kg = sum(point_mass.mass_kg for point_mass in point_masses if point_mass.joint == PLATFORM)
     stated_kg = platform_kg + carried_kg(robot, masses, np.nan_to_num(motion.payload_kg))
     extra = OPTIONS.payload_sd_per_stated_mass * float(stated_kg.max(initial=0.0))

@@ -110,7 +110,9 @@ def measured_again(case):
 
 
 def noise_notes(case, stated_mm, contradicted):
-    """Sentences on a noise that contradicts the stated one (mm per axis) by more than a factor."""
+    """Sentences on a noise that contradicts the stated one (mm per axis, None: none) by more than a factor."""
+    if stated_mm == 0.0:
+        yield f"noise_mm is 0, which no instrument reaches: the noise is estimated, {case.noise_mm:.3g} mm per axis"
     if not stated_mm:
         return
     found = f"noise stated {stated_mm:.3g} mm per axis, found {case.noise_mm:.3g}"

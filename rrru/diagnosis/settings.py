@@ -112,12 +112,19 @@ def _check_weight(values):
 
 
 def _with_known(effect, values):
-    """The effect with parameters of its shapes fixed to known values; raises ConfigError for an unknown parameter."""
+    """The effect with parameters of its shapes fixed to known values; raises ConfigError for an unknown parameter or a
+    value beyond its bounds.
+    """
     coordinates = effect.coordinates
     unknown = [key for key in values if key not in coordinates.shapes[0]]
     if unknown:
         allowed = ", ".join(coordinates.shapes[0]) or "none"
         raise ConfigError(f"gap.known: {effect.name} has no known {unknown[0]!r}; allowed: {allowed}")
+    for key, value in values.items():
+        one = effect.parameters[key]
+        if not one.low <= value <= one.high:
+            allowed = f"{one.low:g} to {one.high:g}" + f" {one.unit}" * (one.unit != "1")
+            raise ConfigError(f"gap.known: {effect.name}.{key} is {value:g}; allowed: {allowed}")
     fixed = dict.fromkeys(tuple((dict(shape) | dict(values)).items()) for shape in coordinates.shapes)
     shapes = tuple(map(dict, fixed))
     # where all parameters are known none is fitted

@@ -44,7 +44,7 @@ class State:
         values = effect.coordinates.to_values(coordinates, shape or self.shape(library, key))
         loaded = motion.under(*self.weight.values()) if self.weight and is_compliant(effect) else motion
         made = effect.contribute(loaded, values)
-        if not (getattr(effect, "needs", ()) and (lacking := lacks_values(effect, motion)).any()):
+        if not (effect.needs and (lacking := lacks_values(effect, motion)).any()):
             return made
         # its change is unknown there; `rrru.diagnosis.evidence` does not count these readings for it
         return Contribution(np.where(lacking[:, None, None], 0.0, made.twists))

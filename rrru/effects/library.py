@@ -5,12 +5,13 @@ A file of the library has a function `for_robot`, from a robot to its Effect, No
 
 import importlib
 import pkgutil
+from dataclasses import fields
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 
-from rrru.effects.protocol import ActiveEffect, Contribution, Effect, plain_coordinates
+from rrru.effects.protocol import ActiveEffect, Contribution, Effect, Motion, plain_coordinates
 from rrru.errors import ConfigError
 from rrru.parameters import ParameterSet
 from rrru.plugins import load_object
@@ -21,6 +22,13 @@ _ORDER = (
     *("base_placement", "frame_misregistration", "encoder_eccentricity", "transmission_error", "thermal_growth"),
     *("lead_error", "screw_growth", "servo_lag", "bar_mismatch", "tool_offset", "joint_axis_error", "cross_compliance"),
 )
+# names of other things in results, settings and estimates, which no effect of a user's may have
+RESERVED = (
+    *("none", "unexplained", "weight", "shape", "geometry", "calibration", "sampling", "scatter", "runs", "instrument"),
+    *("unknown_drive", "unknown_drift", "unknown_affine", "unknown_place", "unknown_load"),
+)
+# fields of a Motion that an effect may need
+_NEEDS = tuple(one.name for one in fields(Motion) if one.name not in ("robot", "path_index", "load_slopes", "approach"))
 # a user's effect that names no typical sizes gets this share of its bounds' width
 _TYPICAL_SHARE = 0.1
 
@@ -108,13 +116,27 @@ def _complete(name, users):
         raise ConfigError(f"effect {name!r} lacks {', '.join(missing)}; needed: name, parameters, contribute")
     if not isinstance(users.parameters, ParameterSet) or not callable(users.contribute):
         raise ConfigError(f"effect {name!r}: parameters is no rrru.parameters.ParameterSet or contribute no function")
-    if users.name in NAMES:
-        raise ConfigError(f"effect {name!r}: its name {users.name!r} belongs to the library; allowed: another one")
+    _check_name(name, users.name)
+    needs = getattr(users, "needs", ())
+    if isinstance(needs, str) or (unknown := [need for need in needs if need not in _NEEDS]):
+        found = f"needs {unknown[0]!r}" if not isinstance(needs, str) else f"has needs = {needs!r}, a text"
+        raise ConfigError(f"effect {name!r} {found}; allowed: a tuple of {', '.join(_NEEDS)}")
     coordinates = getattr(users, "coordinates", None)
     if coordinates is None:
         coordinates = _default_coordinates(name, users.parameters)
     checked = partial(_checked, name, users.contribute)
-    return Effect(users.name, users.parameters, coordinates, checked, tuple(getattr(users, "needs", ())))
+    return Effect(users.name, users.parameters, coordinates, checked, tuple(needs))
+
+
+def _check_name(name, own):
+    """Raise ConfigError where a user's effect has a name that tables and settings cannot hold."""
+    if own in NAMES:
+        raise ConfigError(f"effect {name!r}: its name {own!r} belongs to the library; allowed: another one")
+    if own in RESERVED:
+        allowed = f"a name other than {', '.join(RESERVED)}"
+        raise ConfigError(f"effect {name!r}: its name {own!r} has another meaning in results; allowed: {allowed}")
+    if not (isinstance(own, str) and own.isidentifier()):
+        raise ConfigError(f"effect {name!r}: its name is {own!r}; allowed: letters, digits and _, such as my_effect")
 
 
 def _checked(name, contribute, motion, values):

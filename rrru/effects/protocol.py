@@ -327,7 +327,7 @@ def bears_load(effect: Any) -> bool:
 
 def is_compliant(effect: Any) -> bool:
     """Whether an effect, or the discrepancy basis, grows with the loads, so that payload and tilt matter."""
-    return bears_load(effect) and not getattr(effect, "switches", False)
+    return bears_load(effect) and not effect.switches
 
 
 def together(effects: Iterable[ActiveEffect], motion: Motion) -> Contribution:

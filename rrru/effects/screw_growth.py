@@ -46,8 +46,7 @@ def for_robot(robot):
 
 def _held(robot, drive):
     """Strains of a drive (its number from 0 on) by the ends at which its screw may be held: parameter, drive, value."""
-    ends = getattr(robot, "drive_range", None)
-    low, high = (0.0, np.nan) if ends is None else ends[drive]
+    low, high = (0.0, np.nan) if robot.drive_range is None else robot.drive_range[drive]
     number = drive + 1
     known = (("low", low), ("high", high)) if np.isfinite([low, high]).all() else (("low", 0.0),)
     return [(Parameter(f"{end}_strain{number}", "1", 0.0, 0.0, _MOST, _SOURCE, number), drive, at) for end, at in known]

@@ -108,8 +108,8 @@ def register_measurements(measurements: pd.DataFrame, robot: Any) -> pd.DataFram
     are turned and shifted into the robot's frame, and unknown places of targets are replaced by those found. Raises
     FitError where they fit in a left-handed frame alone.
     """
-    used, reads = rows.usable(measurements), getattr(robot, "reads", None)
-    if reads is None or not reads.frame or used.sum() < _MIN_READINGS:
+    used, reads = rows.usable(measurements), robot.reads
+    if not reads.frame or used.sum() < _MIN_READINGS:
         return measurements
     actuators, command = rows.actuators(measurements, robot), rows.command(measurements)
     poses, twists = robot.solve(actuators, command), robot.twists()

@@ -20,6 +20,8 @@ from rrru.kinematics.legs import Legs, Parts
 from rrru.kinematics.point_masses import PLATFORM
 
 _EYE = np.eye(6)
+# number of the leg of a pose that is of no known end effector
+_NO_LEG = -1
 # point masses of two arms' descriptions are the same within this
 _SAME_MM = 1e-6
 
@@ -52,7 +54,7 @@ class Ends:
         every, leg = ends(self.legs, np.asarray(actuators, dtype=float), Twists(self.legs, twists)), start.leg
         rows = np.arange(len(leg))
         position, turn = (np.stack(part)[leg, rows] for part in zip(*every, strict=True))
-        known = np.isfinite(position).all(axis=1) & np.isfinite(turn).all(axis=(1, 2))
+        known = (leg != _NO_LEG) & np.isfinite(position).all(axis=1) & np.isfinite(turn).all(axis=(1, 2))
         position[~known], turn[~known] = np.nan, np.nan
         return EndEffectorPoses(position, turn, start.passive, np.where(known, 0.0, np.inf), known, leg)
 
@@ -73,10 +75,14 @@ class MultiArmRobot(GeneralRobot):
         return Ends(self.legs)
 
     def near(self, position_mm, actuators):
-        """EndEffectorPoses (n) with the nominal tools nearest to positions (n, 3), at actuator values (n, K)."""
-        actuators = np.asarray(actuators, dtype=float)
-        off = np.nan_to_num(self._tools(actuators) - np.asarray(position_mm))
-        none, leg = np.zeros((len(actuators), 0)), np.linalg.norm(off, axis=2).argmin(axis=0)
+        """EndEffectorPoses (n) with the nominal tools nearest to positions (n, 3), at actuator values (n, K).
+
+        NaN where a position is NaN: it does not determine which end effector the pose is of.
+        """
+        actuators, position = np.asarray(actuators, dtype=float), np.asarray(position_mm, dtype=float)
+        off = np.nan_to_num(self._tools(actuators) - position)
+        nearest = np.linalg.norm(off, axis=2).argmin(axis=0)
+        none, leg = np.zeros((len(actuators), 0)), np.where(np.isfinite(position).all(axis=1), nearest, _NO_LEG)
         return self.model.solve(actuators, EndEffectorPoses(None, None, none, None, None, leg))
 
     def guess(self, actuators, targets=None):

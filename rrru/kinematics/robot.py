@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rrru.errors import UnreachableError
+from rrru.kinematics.base_parameters import MeasurementConfig
 from rrru.kinematics.chain import Poses
 from rrru.kinematics.closure import Closure
 from rrru.kinematics.legs import Legs, Parts
@@ -31,7 +32,11 @@ class Robot(ABC):
     parts: its Parts; directions (sites, 6, p): the twists that a unit of each parameter makes; TRACKED: the set of
     parameters that measured positions identify, RICHEST: the largest such set, SEARCHED: that of the genetic algorithm;
     angle_arm_mm: characteristic length that makes angles comparable with lengths; size_mm: upper bound of the tool's
-    distance from the origin; up (3,): away from the ground.
+    distance from the origin; farthest_mm: that of the farthest reachable point, or size_mm; reach_mm: upper bound of
+    the tool's distance from a leg's foot; drive_range (K, 2): actuator values between which it works, None where none
+    is stated; up (3,): away from the ground.
+
+    Every attribute that code asks a robot for is named in this class, with its default where most robots have it.
     """
 
     name: str
@@ -41,6 +46,9 @@ class Robot(ABC):
     directions: np.ndarray
     angle_arm_mm: float
     size_mm: float
+    farthest_mm: float
+    reach_mm: float
+    drive_range: FloatArray | None
     TRACKED: str
     RICHEST: str
     SEARCHED: str
@@ -50,6 +58,10 @@ class Robot(ABC):
     # one; None where it states none
     effort_limits: FloatArray | None = None
     velocity_limits: FloatArray | None = None
+    # `rrru.kinematics.point_masses.PointMass` of its links
+    point_masses: tuple = ()
+    # what a campaign measures in addition to the tool's position, and what is unknown about it
+    reads: MeasurementConfig = MeasurementConfig()
     # whether its drives can orient its platform besides moving it
     orients = False
     # whether positions and their slopes are found without poses
@@ -60,6 +72,10 @@ class Robot(ABC):
     @abstractmethod
     def inverse(self, position_mm: np.ndarray, deviations: np.ndarray | None = None, elbow: str = "out") -> np.ndarray:
         """Actuator values (n, K) for positions (n, 3) in an assembly ("out", "in"); NaN where out of reach."""
+
+    @abstractmethod
+    def identifiable(self, values: dict[str, float]) -> dict[str, float]:
+        """Mapping of the parameters from values of any of its deviations by name."""
 
     @property
     def strokes(self):

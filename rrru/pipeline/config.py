@@ -8,7 +8,7 @@ from pathlib import Path
 
 from rrru.errors import ConfigError
 from rrru.pipeline.jobs.outputs import GAP_FIGURES
-from rrru.plugins import module_file
+from rrru.plugins import module_file, own_code_digest
 from rrru.robots.catalogue import OWN
 
 # keys that the job of a calibration reads besides robot and sets, and that of the genetic algorithm
@@ -42,6 +42,8 @@ def robot(config, section):
     own = own_robot_file(dimensions)
     # the user's own robot changes with its file
     digest = {"digest": hashlib.sha256(own.read_bytes()).hexdigest()} if own and own.is_file() else {}
+    if "module" in dimensions:
+        digest = {"digest": own_code_digest([dimensions["module"]])}
     chosen = {"name": name, "dimensions": dimensions, "parameter_set": section.get("errors"), **digest}
     if "targets" in section:
         chosen["targets"] = sorted(section["targets"])
@@ -112,10 +114,14 @@ def virtual(config, name):
     section = config["campaigns"][name]
     if "virtual" not in section:
         return None
+    real = config["virtual_robots"][section["virtual"]]
+    own = own_effects(real)
     return {
         "name": name,
         "seed": config["seed"],
-        "robot": config["loads"] | config["virtual_robots"][section["virtual"]],
+        # the user's own effects change with their code
+        **({"digest": own_code_digest(own)} if own else {}),
+        "robot": config["loads"] | real,
         "trajectories": config["trajectories"][section["trajectories"]],
         "passes": section.get("passes", [{"reverse": False, "payload_kg": 0.0}]),
         "motion": config["motion"],
@@ -155,7 +161,7 @@ def diagnosis_settings(config, name, section):
         "campaign": name,
         "robot": robot(config, section),
         "masses": masses(config, section),
-        "noise_mm": section.get("noise_mm") or None,
+        "noise_mm": section.get("noise_mm"),
         "noise_rad": section.get("noise_rad"),
         "noise_known": section.get("noise_known", False),
         "limits": limits(config, section),
@@ -170,6 +176,17 @@ def figure_options(config, name):
     """Options of the figures of a campaign."""
     method = config["reproduce"]["method"] if of_reproduced_study(config, name) else "least_squares"
     return {"campaign": name, "method": method, "mode": "closed_loop"}
+
+
+def own_effects(section):
+    """Names `module:object` of the user's own effects in all lists and mappings of effects below a section, sorted."""
+    found = set()
+    for key, value in section.items():
+        if key.endswith("effects") and isinstance(value, list | dict):
+            found |= {name for name in value if ":" in str(name)}
+        elif isinstance(value, dict):
+            found |= set(own_effects(value))
+    return sorted(found)
 
 
 def masses(config, section):
@@ -189,6 +206,9 @@ def check(config):
     for name, section in config["campaigns"].items():
         if "virtual" in section:
             _check_virtual(config, name, section)
+        elif section.get("noise_mm") == 0.0:
+            allowed = "a positive number of mm; leave the key out where the noise is unknown, it is then estimated"
+            raise ConfigError(f"campaigns.{name}.noise_mm: 0, which no instrument reaches; allowed: {allowed}")
 
 
 def check_files(config):

@@ -81,8 +81,10 @@ class VirtualCampaign:
             return self.robot.run(self.plan, self.noise_mm, generator, controller, self.sees)
         path, index = self.plan.path()
         wanted = (controller or mechanism.inverse)(path)
-        measurements, truth = self.robot.run(self.plan, self.noise_mm, generator, lambda _: self.drive(wanted))
-        return measurements.assign(**dict(zip(mechanism.parts.columns, wanted[index].T, strict=True))), truth
+        sent = self.drive(wanted)
+        measurements, truth = self.robot.run(self.plan, self.noise_mm, generator, lambda _: sent, self.sees)
+        read = wanted[index][self.sees.rows(len(index))]
+        return measurements.assign(**dict(zip(mechanism.parts.columns, read.T, strict=True))), truth
 
 
 def real_robot(nominal, section):

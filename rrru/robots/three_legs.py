@@ -68,6 +68,7 @@ class ThreeLegs(Robot):
     SOURCE = ""
     COLUMN_SITES = ()
     SEARCHED = "tied"
+    drive_range = None
     closed_form = True
 
     def __post_init__(self):

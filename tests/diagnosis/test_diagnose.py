@@ -296,6 +296,7 @@ def test_a_library_that_makes_no_sense_is_refused(lagging):
         (GapSettings(effects=("backlash", "backlash")), "twice"),
         (GapSettings(known={"nosuch": {}}), "nosuch"),
         (GapSettings(known={"transmission_error": {"amplitude1": 1.0}}), "amplitude1"),
+        (GapSettings(known={"transmission_error": {"ratio": -31.0}}), "ratio is -31; allowed: 1 to 1000"),
     ):
         with pytest.raises(ConfigError, match=message):
             diagnosed(lagging, settings=settings)

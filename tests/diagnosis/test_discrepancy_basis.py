@@ -7,10 +7,29 @@ import pytest
 
 from rrru.diagnosis.discrepancy_basis import UNKNOWN, unknown_functions
 from rrru.diagnosis.make_problem import make_case
+from rrru.diagnosis.payload_nuisance import WEIGHT
+from rrru.diagnosis.problem import GEOMETRY
+from rrru.effects.library import RESERVED
 from rrru.effects.protocol import Contribution
 from rrru.robots.delta import Delta
 from rrru.robots.ptt3 import Ptt3
 from tests.diagnosis.campaigns import MASSES, MODEL, NOISE_MM, case_of, diagnosed, measure, robot_of
+
+
+def test_no_effect_of_a_user_s_can_have_the_name_of_a_part_of_the_results():
+    of_results = {
+        *UNKNOWN,
+        WEIGHT,
+        GEOMETRY,
+        "none",
+        "unexplained",
+        "shape",
+        "calibration",
+        "scatter",
+        "runs",
+        "sampling",
+    }
+    assert of_results <= {*RESERVED}
 
 
 @pytest.fixture(scope="module")

@@ -11,11 +11,12 @@ from scipy.spatial.transform import Rotation
 
 from rrru.campaign import measurements as rows
 from rrru.diagnosis.calibrate import calibrate
-from rrru.diagnosis.diagnose import with_wide_bounds
+from rrru.diagnosis.diagnose import MeasuredRobot, with_wide_bounds
 from rrru.diagnosis.make_problem import make_case
 from rrru.diagnosis.model_fit import fit_model
-from rrru.diagnosis.result_notes import payload_notes, undetermined_payload_notes, zero_notes
+from rrru.diagnosis.result_notes import noise_notes, payload_notes, undetermined_payload_notes, zero_notes
 from rrru.diagnosis.terms import EffectTerm
+from rrru.errors import ConfigError
 from rrru.kinematics.dynamics import Masses
 from rrru.robots.serial import serial
 from tests.diagnosis import campaigns
@@ -146,3 +147,15 @@ def test_with_one_load_a_mass_and_a_compliance_are_confounded():
     weight, notes, (note,) = _weighed((campaigns.FORWARD, campaigns.REVERSE), 0.5 * _PLATFORM_KG)
     assert weight[0][2] > 3.0 * weight[0][3]
     assert not notes and note.endswith("are not separately identifiable from these readings: measure with two loads")
+
+
+def test_a_stated_noise_of_zero_is_no_noise_and_noted():
+    (note,) = noise_notes(SimpleNamespace(noise_mm=0.021), 0.0, 2.0)
+    assert note == "noise_mm is 0, which no instrument reaches: the noise is estimated, 0.021 mm per axis"
+    assert not [*noise_notes(SimpleNamespace(noise_mm=0.021), None, 2.0)]
+
+
+@pytest.mark.parametrize("noise", [{"noise_mm": -0.02}, {"noise_rad": 0.0}, {"noise_rad": -1e-4}])
+def test_a_noise_that_no_instrument_has_is_refused(noise):
+    with pytest.raises(ConfigError, match=f"{next(iter(noise))} is {next(iter(noise.values()))}; allowed: a positive"):
+        MeasuredRobot(campaigns.MODEL, **noise)

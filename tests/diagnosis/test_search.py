@@ -153,6 +153,8 @@ class FakeCompliance:
     parameters: ParameterSet = EFFECTS["drive_compliance"].parameters
     coordinates: Coordinates = EFFECTS["drive_compliance"].coordinates
     needs: tuple = ("drive_load",)
+    along_drives = with_waves = None
+    switches = False
 
     def contribute(self, motion, values):
         """Changes (n, 3) of the drive angles."""

@@ -142,6 +142,8 @@ class ArmGrowth:
     parameters: ParameterSet = _GROWTH
     coordinates: Coordinates = _GROWTHS
     needs: tuple = ()
+    along_drives = with_waves = None
+    switches = False
 
     def contribute(self, motion, values):
         """Shifts of the elbows along the arms."""

@@ -45,6 +45,24 @@ class Silent(Creep):
 class Usurper(Creep):
     name = "backlash"
 
+class Weight(Creep):
+    name = "weight"
+
+class Nothing(Creep):
+    name = "none"
+
+class Calibration(Creep):
+    name = "calibration"
+
+class Two(Creep):
+    name = "backlash+creep"
+
+class Hasty(Creep):
+    needs = ("tme_s",)
+
+class Text(Creep):
+    needs = "time_s"
+
 class Boundless(Creep):
     name = "boundless"
     parameters = ParameterSet((Parameter("rate", "rad/s"),))
@@ -127,6 +145,12 @@ def test_a_users_contribution_gets_its_full_shape():
         ("own_effects:half", "lacks parameters, contribute"),
         ("own_effects:Numbers", "parameters is no rrru.parameters.ParameterSet"),
         ("own_effects:Usurper", "its name 'backlash' belongs to the library"),
+        ("own_effects:Weight", "its name 'weight' has another meaning"),
+        ("own_effects:Nothing", "its name 'none' has another meaning"),
+        ("own_effects:Calibration", "its name 'calibration' has another meaning"),
+        ("own_effects:Two", r"its name is 'backlash\+creep'; allowed: letters"),
+        ("own_effects:Hasty", "needs 'tme_s'; allowed: a tuple of .*time_s"),
+        ("own_effects:Text", "has needs = 'time_s', a text; allowed: a tuple"),
         ("own_effects:Boundless", "rate has no finite bounds"),
         ("own_effects:Choosy", "class without arguments"),
     ],

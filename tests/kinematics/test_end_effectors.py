@@ -68,6 +68,10 @@ def test_what_nobody_knows_is_no_pose():
     drives = DRIVES.copy()
     drives[3] = np.nan
     assert ROBOT.solve(drives, _own()).closed.tolist() == [k != 3 for k in range(COUNT)]
+    # nor is one of an end effector that nobody knows
+    near = _own().copy()
+    near[5, 1] = np.nan
+    assert ROBOT.solve(DRIVES, near).closed.tolist() == [k != 5 for k in range(COUNT)]
 
 
 def test_the_effect_of_every_site_and_drive_is_the_slope_of_what_is_read():

@@ -8,9 +8,11 @@ from scipy.spatial.transform import Rotation
 
 from rrru.calibration.calibrate import calibrate
 from rrru.estimation.observations.target_positions import TargetPositions
+from rrru.kinematics.augmented_robot import AugmentedRobot
 from rrru.kinematics.base_parameters import MeasurementConfig
 from rrru.kinematics.legs import TOOL, WORLD
 from rrru.kinematics.readings import Readings, lacking
+from rrru.kinematics.robot import Robot
 from tests.kinematics.test_general_model import GENERAL, ROBOTS, _about_home, _clear
 
 _REFLECTORS = {"ball a": (60.0, 0.0, 40.0), "ball b": (-30.0, 50.0, 45.0), "ball c": (-30.0, -50.0, 90.0)}
@@ -146,3 +148,47 @@ def test_a_robot_with_a_closed_form_gets_frame_and_reflectors_beside_its_own_num
     robot, fit, off = _off(robot, points, actuators, turned=True)
     assert robot.parameters.names[: len(own)] == own and len(robot.parameters) > len(own) + 9
     assert off[~fit.identifiability.unseen].max() < 1e-6 and fit.rms_mm < 1e-8
+
+
+# closed forms of a robot, in place of which a robot as read uses the general model
+_CLOSED_FORMS = {
+    *("closed_form", "forward", "forward_batch", "mean_distance", "actuator_jacobian", "parameter_jacobian"),
+    "singularities",
+}
+
+
+@pytest.mark.parametrize("name", [*ROBOTS])
+def test_a_robot_as_read_has_every_attribute_of_its_robot(name):
+    robot, _, _ = _clear(name)
+    read = robot.reading(MeasurementConfig((*_REFLECTORS,), ("ball a",), frame=True))
+    of_every_robot = {*vars(Robot), *Robot.__annotations__}
+    changed = {
+        attribute
+        for kind in type(robot).__mro__[: type(robot).__mro__.index(Robot)]
+        for attribute in vars(kind)
+        if attribute in of_every_robot and not attribute.startswith("_")
+    }
+    missing = changed - {*vars(AugmentedRobot), *AugmentedRobot.__dataclass_fields__} - _CLOSED_FORMS
+    assert not missing, f"AugmentedRobot has the default of {missing}: add it to its list of the robot's own"
+    for attribute in Robot.__annotations__.keys() - {"parameters", "legs", "directions", "reads"}:
+        assert getattr(read, attribute) is getattr(robot, attribute) or getattr(read, attribute) == getattr(
+            robot, attribute
+        )
+
+
+def test_a_robot_as_read_starts_where_its_robot_starts():
+    robot, points, actuators = _clear("rrru3")
+    read = robot.reading(MeasurementConfig((*_REFLECTORS,), turned=True, frame=True))
+    np.testing.assert_allclose(read.forward(actuators), points, atol=1e-6)
+    assert read.reading(MeasurementConfig(turned=True)).robot is robot
+
+
+def test_a_robot_as_read_knows_the_deviations_of_its_robot_and_its_own():
+    robot, points, actuators = _clear("rrru3")
+    read = robot.reading(MeasurementConfig((*_REFLECTORS,), ("ball a",), frame=True))
+    for deviation in robot.deviation_names:
+        twists = read.twists_of({deviation: 1e-3, "world_x": 0.3})
+        poses = read.solve(actuators, points, twists)
+        plain = robot.twists_of({deviation: 1e-3})
+        expected = robot.measured(robot.solve(actuators, points, plain), plain) + np.array([0.3, 0.0, 0.0])
+        np.testing.assert_allclose(read.measured(poses, twists), expected, atol=1e-9)

@@ -1,10 +1,12 @@
 """Parts of the configuration that campaigns get."""
 
+import pytest
 import yaml
 
 from rrru.diagnosis.design.run_limits import StatedLimits
+from rrru.errors import ConfigError
 from rrru.pipeline import setup
-from rrru.pipeline.config import limits, of_reproduced_study, robot, sets, source
+from rrru.pipeline.config import check, limits, of_reproduced_study, robot, sets, source
 from tests.places import ROOT
 
 CONFIG = yaml.safe_load((ROOT / "config.yaml").read_text())
@@ -19,6 +21,13 @@ def test_the_sets_of_the_reproduced_study_are_for_its_robot_alone():
     assert sets(own, "mine") == {"all": ["*"]} and not of_reproduced_study(own, "mine")
     assert set(sets(CONFIG, "paper")) == {"group_1", "lines", "spiral", "all"}
     assert sets(CONFIG, "field_01") == sets(CONFIG, "paper")
+
+
+def test_a_measured_campaign_cannot_be_without_noise():
+    with pytest.raises(ConfigError, match=r"campaigns\.mine\.noise_mm: 0, .*; allowed: .*leave the key out"):
+        check(_with_campaign(robot="rrru3", ingest="mine.csv", noise_mm=0))
+    check(_with_campaign(robot="rrru3", ingest="mine.csv", noise_mm=0.01))
+    check(_with_campaign(robot="rrru3", virtual="twin", trajectories="paper", noise_mm=0))
 
 
 def test_sets_of_an_overlay_are_for_every_campaign():

@@ -17,11 +17,11 @@ from rrru.campaign.ingest.geometry import beyond_ranges, check_commands, check_m
 from rrru.campaign.ingest.gross_errors import GrossError, find_gross_error, frame_advice
 from rrru.campaign.ingest.gross_file import ORDINARY_SHARE, GrossFile
 from rrru.campaign.ingest.guess import guess_columns
-from rrru.campaign.ingest.in_robot_frame import at_tool, outliers, register_sheet
+from rrru.campaign.ingest.in_robot_frame import at_tool, jumps, outliers, register_sheet
 from rrru.campaign.ingest.mounting import Mounting, check_turned, mounting, places_instead
 from rrru.campaign.ingest.problems import Problems
 from rrru.campaign.ingest.registration import Registration
-from rrru.campaign.ingest.sent import sent_to
+from rrru.campaign.ingest.sent import check_end_effectors, sent_to
 from rrru.campaign.ingest.sheet import COMMAND, MEASURED, NOISE, TARGET, TURNS, Sheet
 from rrru.campaign.ingest.spec import MM, IngestSpec
 from rrru.campaign.measurements import command, measured, turn_columns, turns, vector_columns
@@ -110,6 +110,8 @@ def _read(spec: IngestSpec, mechanism: Robot) -> tuple[Sheet, list[str]]:
         frame = frame.assign(**vector_columns("command", sent_to(frame, mechanism, problems)))
         which = f"{drives[0]} to {drives[-1]} ({mechanism.name}, nominal)"
         notes.append(f"no commanded positions: computed from {which}")
+    else:
+        check_end_effectors(frame, mechanism, problems)
     frame, more = number_runs(frame, spec.motion is not None and spec.motion.stops)
     sheet = Sheet(spec, mechanism, problems, found, frame)
     return sheet, notes + more + _notes_on_columns(sheet)
@@ -196,19 +198,19 @@ def _table(
     sheet: Sheet, mounted: Mounting | None, registration: Registration | None, digit_mm: float
 ) -> tuple[pd.DataFrame, list[str]]:
     """Frame in the form of the schema of measurements, and notes on implausible values and on outliers."""
-    frame, drives = at_tool(sheet, mounted).frame, sheet.drives
-    values, turned = sheet.actuators(command(frame)), set(TURNS["measured"]) <= set(frame)
-    wrong = mounted.strays if mounted else np.zeros(len(frame), dtype=bool)
+    seen, drives = at_tool(sheet, mounted).frame, sheet.drives
+    values, turned = sheet.actuators(command(seen)), set(TURNS["measured"]) <= set(seen)
+    wrong = mounted.strays if mounted else np.zeros(len(seen), dtype=bool)
     places = partial(places_instead, sheet)
-    notes = [*plausibility_notes(frame[~wrong], sheet.mechanism, places), *beyond_ranges(values, sheet.mechanism)]
-    outlier = outliers(frame, digit_mm) | wrong
+    notes = [*plausibility_notes(seen[~wrong], sheet.mechanism, places), *beyond_ranges(values, sheet.mechanism)]
+    outlier = outliers(seen, digit_mm) | wrong
     computed = dict(zip(drives, values.T, strict=True))
     if turned or mounted or sheet.mechanism.orients:
         computed |= turn_columns("command", sheet.poses.turn)
     if turned and registration and not mounted:
-        computed |= turn_columns("measured", registration.rotation @ turns(frame, "measured"))
+        computed |= turn_columns("measured", registration.rotation @ turns(seen, "measured"))
     if mounted:
-        computed |= mounted.columns(frame, registration.rotation if registration else np.eye(3))
+        computed |= mounted.columns(seen, registration.rotation if registration else np.eye(3))
     if sheet.spec.motion:
         computed |= sheet.spec.motion.columns()
     frame = sheet.frame.assign(**computed, status=np.where(outlier, "outlier", "ok"))
@@ -218,6 +220,13 @@ def _table(
         count = int(outlier.sum())
         points = "1 point marked as outlier" if count == 1 else f"{count} points marked as outliers"
         notes.append(f"{points}, in the table but not in fits: {where}{more}")
+    if (jumping := jumps(seen, digit_mm) & ~outlier).any():
+        where = ", ".join(f"row {row}" for row in frame.index[jumping][:10])
+        where += ", ..." if jumping.sum() > 10 else ""
+        notes.append(
+            f"at least {jumping.sum()} points jump off their neighbours, in runs where more than a tenth do: {where}. "
+            "A loose joint does that, so fits use them. If no joint is loose, the instrument is the cause: delete them"
+        )
     moved = ("time_s", *COMMAND, *drives, *MEASURED, "speed_mm_s", "payload_kg")
     optional = (*TURNS["command"], *TURNS["measured"], *NOISE, "temperature_c", "target", *TARGET, "target_on")
     extra = [name for name in (*optional, "motion", "motion_between") if name in frame]

@@ -8,7 +8,7 @@ import pandas as pd
 from rrru.campaign.ingest.checks import path_length
 from rrru.campaign.ingest.geometry import frame_limit
 from rrru.campaign.ingest.mounting import Mounting
-from rrru.campaign.ingest.outliers import flag_outliers, reproduced
+from rrru.campaign.ingest.outliers import flag_outliers, frequent_jumps, reproduced
 from rrru.campaign.ingest.registration import Registration, register
 from rrru.campaign.ingest.sheet import MEASURED, Sheet
 from rrru.campaign.measurements import command, measured, series, vector_columns
@@ -72,3 +72,11 @@ def outliers(frame: pd.DataFrame, digit_mm: float) -> np.ndarray:
     deviation = measured(frame) - target
     marked = flag_outliers(deviation, run, noise_mm=digit_mm, place=path_length(target))
     return marked & ~reproduced(marked, deviation, target, run)
+
+
+def jumps(frame: pd.DataFrame, digit_mm: float) -> np.ndarray:
+    """Rows (n,) that jump off their neighbours in runs where too many do for `outliers`; arguments as there."""
+    target, run = command(frame), series(frame)
+    deviation = measured(frame) - target
+    found = frequent_jumps(deviation, run, noise_mm=digit_mm)
+    return found & ~reproduced(found, deviation, target, run)

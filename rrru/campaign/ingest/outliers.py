@@ -46,6 +46,25 @@ def flag_outliers(deviation_mm, run, noise_mm=None, threshold=6.0, place=None):
     return marked
 
 
+def frequent_jumps(deviation_mm, run, noise_mm=None, threshold=6.0):
+    """Points (n,) off the running median of seven in runs where more than a tenth of the points are, ends apart.
+
+    Arguments as of `flag_outliers`, which marks few of them or none: a loose joint jumps so often. So does an
+    instrument whose beam breaks often; these data do not separate both.
+    """
+    deviation, run = np.asarray(deviation_mm, dtype=float), np.asarray(run)
+    result = np.zeros(len(deviation), dtype=bool)
+    known = np.isfinite(deviation).all(axis=1)
+    for number in np.unique(run[known]):
+        rows = np.flatnonzero(known & (run == number))
+        if len(rows) > _WINDOW:
+            # near the ends of a run there are no seven neighbours, and errors may grow fast
+            rows, off = rows[_LONGEST:-_LONGEST], _off_median(deviation[rows])[_LONGEST:-_LONGEST]
+            limit = threshold * robust_sd(off, MEDIAN_OF_LENGTH, max(noise_mm or 0.0, _SPIKE_MM))
+            result[rows] = (off > limit) & ((off > limit).mean() > _BAD_SHARE)
+    return result
+
+
 def reproduced(marked, deviation_mm, command_mm, run, tolerance_mm=0.6):
     """Which marked points (n,) another run came back to: the robot repeats a spike near a singularity, a beam does not.
 
@@ -96,9 +115,7 @@ def _worst_block(place, deviation, noise_mm, threshold):
 
 def _inner_blocks(place, deviation, noise_mm, threshold):
     """Per length of block: the worst block's least distance from its neighbours' curve, its limit, its indices."""
-    from scipy.ndimage import median_filter
-
-    off_median = np.linalg.norm(deviation - median_filter(deviation, size=(_WINDOW, 1), mode="nearest"), axis=1)
+    off_median = _off_median(deviation)
     for length in range(1, _LONGEST + 1):
         floor = max(noise_mm, _SPIKE_MM if length == 1 else _FLIP_MM)
         blocks = np.arange(1, len(place) - length)[:, None] + np.arange(length)
@@ -107,6 +124,13 @@ def _inner_blocks(place, deviation, noise_mm, threshold):
         limit = threshold * robust_sd(off, MEDIAN_OF_LENGTH, floor)
         least = np.where(off_median[blocks].min(axis=1) > threshold * floor, off.min(axis=1), 0.0)
         yield least.max(), limit, blocks[np.argmax(least)]
+
+
+def _off_median(deviation):
+    """Distances (n,) of deviations (n, 3) of one run from their running median."""
+    from scipy.ndimage import median_filter
+
+    return np.linalg.norm(deviation - median_filter(deviation, size=(_WINDOW, 1), mode="nearest"), axis=1)
 
 
 def _off_curve(place, deviation, blocks, nodes):

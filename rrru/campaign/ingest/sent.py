@@ -2,6 +2,11 @@
 
 import numpy as np
 
+from rrru.campaign.ingest.sheet import COMMAND, position_text
+
+# the same end effector's position within rounding
+_SAME_MM = 1e-6
+
 
 def sent_to(frame, mechanism, problems):
     """Positions (n, 3) of the nominal robot at a file's drive values, NaN where one is noted.
@@ -10,7 +15,7 @@ def sent_to(frame, mechanism, problems):
     effector that was measured, for a robot with several.
     """
     drives = [*mechanism.parts.columns]
-    _check_end_effectors(frame, mechanism, problems)
+    check_end_effectors(frame, mechanism, problems)
     values = frame[drives].to_numpy(dtype=float)
     position = mechanism.forward(values, guess_mm=mechanism.guess(values, frame.get("target")))
     # blank drive values are a problem of their own
@@ -21,8 +26,11 @@ def sent_to(frame, mechanism, problems):
     return position
 
 
-def _check_end_effectors(frame, mechanism, problems):
-    """Refuse rows that do not name a target on one of the end effectors, for a robot with several."""
+def check_end_effectors(frame, mechanism, problems):
+    """Refuse rows that do not name a target on one of the end effectors, for a robot with several.
+
+    A pose belongs to the end effector nearest to the commanded position, so that this has to be the named one's.
+    """
     carried = [target for targets in mechanism.legs.hands for target in targets]
     if carried and "target" not in frame:
         problems.add("missing column", column="target", value="no such column", allowed=", ".join(carried))
@@ -30,4 +38,17 @@ def _check_end_effectors(frame, mechanism, problems):
         for i in np.flatnonzero(~frame["target"].isin(carried)):
             value, allowed = frame["target"].iloc[i], f"a target on an end effector: {', '.join(carried)}"
             problems.add("reflectors", row=frame.index[i], column="target", value=value, allowed=allowed)
+    drives = [*mechanism.parts.columns]
+    if carried and not set(drives) <= set(frame):
+        allowed = "a column for each drive: commanded positions do not determine those of several end effectors"
+        problems.add("missing column", column=", ".join(drives), value="no such columns", allowed=allowed)
+    problems.refuse()
+    if carried and set(COMMAND) <= set(frame):
+        values, command = frame[drives].to_numpy(dtype=float), frame[[*COMMAND]].to_numpy(dtype=float)
+        stated, nearest = mechanism.guess(values, frame["target"]), mechanism.forward(values, guess_mm=command)
+        for i in np.flatnonzero(np.linalg.norm(stated - nearest, axis=1) > _SAME_MM):
+            target = frame["target"].iloc[i]
+            value = f"{position_text(command[i])}, nearest to another end effector than that of {target}"
+            allowed = f"its tool's position, {position_text(stated[i])}; or no commanded columns, these are computed"
+            problems.add("end effector", row=frame.index[i], column=", ".join(COMMAND), value=value, allowed=allowed)
     problems.refuse()

@@ -110,7 +110,7 @@ def effect_twists(inference, motion):
     state, library = inference.state, inference.case.library
     change = Contribution(motion.robot.twists())
     for key in state.effects:
-        needs = getattr(library[key[0]], "needs", ())
+        needs = library[key[0]].needs
         if all(np.isfinite(getattr(motion, need)).all() for need in needs):
             change = change + state.contribution(library, key, motion)
     return change.twists

@@ -116,9 +116,7 @@ def run_limits(case: Any, masses: Any, stated: StatedLimits) -> tuple[RunLimits,
 def moved_kg(robot: Any, masses: Any) -> float:
     """Mass in kg that a robot itself moves: platform, arms and forearms, and the point masses of its file."""
     legs = len(robot.parts.members) * masses.forearm_kg + len(robot.parts.drives) * masses.arm_kg
-    return float(
-        masses.platform_kg + legs + sum(point_mass.mass_kg for point_mass in getattr(robot, "point_masses", ()))
-    )
+    return float(masses.platform_kg + legs + sum(point_mass.mass_kg for point_mass in robot.point_masses))
 
 
 def _spare_kg(case: Any) -> float:

@@ -31,7 +31,8 @@ def diagnose(settings, measurements, progress=None):
     the calibration, and ConfigError for settings that do not fit together.
     """
     noise = {key: settings[key] for key in ("noise_mm", "noise_rad", "noise_known")}
-    noise["noise_mm"] = noise["noise_mm"] or read_noise(measurements)
+    if noise["noise_mm"] is None:
+        noise["noise_mm"] = read_noise(measurements)
     robot = core.MeasuredRobot(
         setup.measured_robot(settings["robot"], measurements),
         Masses(**settings["masses"]),

@@ -5,12 +5,13 @@ The strength is drawn, and the effect's coordinates are scaled to it: first with
 simulations of the robot.
 """
 
+from collections import Counter
 from dataclasses import asdict, replace
 
 import numpy as np
 
 from rrru.campaign.trajectories import from_config
-from rrru.errors import UnreachableError
+from rrru.errors import ConfigError, UnreachableError
 from rrru.kinematics import singularity
 from rrru.seeds import stream
 from rrru.studies.blind_validation.noise import NOISES, NoiseModel
@@ -29,6 +30,9 @@ AXES_SD = {"mm": 0.01, "rad": 5e-5}
 _ANGLE_SD_RAD, _LENGTH_SD_MM = 0.002, 0.5
 _SAFE = 0.1
 _DRAWS = 20
+# ASSUME most draws of trajectories of one robot; with the dimensions of config.yaml the first one of 200 fits
+_MAX_TRAJECTORY_DRAWS = 200
+_OUT_OF_REACH, _SINGULAR = "out of reach", "near a singularity"
 
 
 def draw(member, conditions):
@@ -159,8 +163,12 @@ def bare(name, generator, mechanism):
 
 
 def _trajectories(generator, mechanism):
-    """Seven lines and a spiral, as an entry of the configuration's `trajectories`, clear of both singularities."""
-    while True:
+    """Seven lines and a spiral, as an entry of the configuration's `trajectories`, clear of both singularities.
+
+    Raises ConfigError where none of many draws fits the robot's dimensions.
+    """
+    obstacles = Counter()
+    for _ in range(_MAX_TRAJECTORY_DRAWS):
         step, height = generator.uniform(28.0, 45.0), generator.uniform(620.0, 680.0)
         start, end, x, y = generator.uniform([-640.0, -60.0, -40.0, -40.0], [-560.0, 40.0, 40.0, 40.0])
         inner, outer, top, bottom, begin = generator.uniform(
@@ -182,17 +190,27 @@ def _trajectories(generator, mechanism):
                 "start_deg": begin,
             },
         }
-        if _safe(section, mechanism):
+        obstacle = _obstacle(section, mechanism)
+        if not obstacle:
             return section
+        obstacles[obstacle] += 1
+    counts = " and ".join(f"{count} are {obstacle}" for obstacle, count in obstacles.items())
+    raise ConfigError(
+        f"robots.{mechanism.name}: of {_MAX_TRAJECTORY_DRAWS} drawn trajectories of the blind validation (`withheld`) "
+        f"{counts}; allowed: dimensions with which the robot reaches, clear of singularities, x = -640 to 40 mm and "
+        "y = -135 to 135 mm at z = 620 to 680 mm, and a spiral of 300 mm radius at z = 550 to 780 mm"
+    )
 
 
-def _safe(section, mechanism):
-    """Whether the trajectories stay clear of both singularities."""
+def _obstacle(section, mechanism):
+    """What keeps the robot from the trajectories: _OUT_OF_REACH, _SINGULAR (either singularity), or "" for nothing."""
     points = np.concatenate([trajectory.curve(np.linspace(0.0, 1.0, 100)) for trajectory in from_config(section)])
     theta = mechanism.inverse(points)
+    if not np.isfinite(theta).all():
+        return _OUT_OF_REACH
     measures = (singularity.translational_measure, singularity.constraint_measure)
     smallest = min(measure(mechanism, points, theta).min() for measure in measures)
-    return bool(np.isfinite(theta).all() and smallest > _SAFE)
+    return "" if smallest > _SAFE else _SINGULAR
 
 
 def draw_acting(robot, name, single, span, generator, conditions):

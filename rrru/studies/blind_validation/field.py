@@ -36,4 +36,8 @@ def read_field_answers(path):
             if name not in (*NAMES, "none") and not is_outside(name):
                 known = f"none, outside, {', '.join(NAMES)}"
                 raise ConfigError(f"withheld.field_answers: campaign {row} has the effect {name!r}; known: {known}")
-    return answers.assign(leg=pd.to_numeric(answers["leg"], errors="coerce").fillna(0).astype(int))
+    for row, leg in zip(answers["campaign"], answers["leg"].astype(str), strict=True):
+        if leg.strip() not in ("", "0", "1", "2", "3"):
+            allowed = "0 to 3, 0 or blank where no leg or all legs have it"
+            raise ConfigError(f"withheld.field_answers: campaign {row} has the leg {leg!r}; allowed: {allowed}")
+    return answers.assign(leg=[int(leg.strip() or 0) for leg in answers["leg"].astype(str)])

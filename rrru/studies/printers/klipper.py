@@ -2,7 +2,8 @@
 
 A setting above the block overrides the saved one, as in Klipper. Absent settings have Klipper's defaults: 200 full
 steps per turn, towers at 210, 330 and 90 degrees, arm and endstop of tower a for the others. Files from before 2021
-have `step_distance` instead of rotation distance and microsteps. `[include ..]` is followed where the file exists.
+have `step_distance` instead of rotation distance and microsteps. `[include ..]` is followed where the file exists. One
+of an absolute path that does not exist is the printer's: its path and its name are tried in printer.cfg's folder.
 """
 
 import configparser
@@ -161,14 +162,24 @@ def _lines(path, seen):
         if not line.startswith("[include "):
             yield line
             continue
-        pattern = line[len("[include ") :].split("]")[0].strip().lstrip("/")
+        pattern = line[len("[include ") :].split("]")[0].strip()
         try:
-            others = sorted(path.parent.glob(pattern))
+            others = _included(path.parent, pattern)
         except (ValueError, OSError) as error:
             raise _unread(path, line, f"{pattern!r} ({error})", "the name of a file, or a pattern of names") from None
         for other in others:
             if other.is_file() and other.resolve() not in seen:
                 yield from _lines(other, seen)
+
+
+def _included(folder, pattern):
+    """Files of the pattern of an include, sorted; see the module for absolute ones."""
+    if not pattern.startswith("/"):
+        return sorted(folder.glob(pattern))
+    # not `**`, which would search the whole disk
+    if found := sorted(Path("/").glob(pattern.replace("**", "*").lstrip("/"))):
+        return found
+    return sorted(folder.glob(pattern.lstrip("/"))) or sorted(folder.glob(Path(pattern).name))
 
 
 def _unread(path, column, value, allowed):

@@ -183,6 +183,19 @@ def test_a_broken_beam_is_kept_and_marked(field, tmp_path):
     assert result.measurements["measured_z_mm"].to_list() == frame["measured_z_mm"].to_list()
 
 
+def test_spikes_too_many_to_be_left_out_are_counted(field, tmp_path):
+    frame = field.copy()
+    spikes = np.flatnonzero(frame["run"] == 1)[3:-3:4]
+    frame.loc[spikes, "measured_z_mm"] += 5.0
+    result = ingest(IngestSpec(written(frame, tmp_path / "f.csv")), ROBOT)
+    assert (result.measurements["status"] == "ok").all()
+    (note,) = result.notes
+    assert (
+        note.startswith(f"at least {len(spikes)} points jump off their neighbours")
+        and f"row {spikes.min() + 2}," in note
+    )
+
+
 def test_stale_readings_are_left_out_and_named(field, expected, tmp_path):
     spoilt = field.copy()
     for row in (8, 100):

@@ -47,3 +47,29 @@ def test_rows_have_to_say_which_hand_they_are_of(tmp_path):
         _ingested(_file().drop(columns="target"), tmp_path)
     with pytest.raises(IngestError, match=r"head.*a target on an end effector: right, left"):
         _ingested(_file().assign(target=["head", "left"] * 40), tmp_path)
+
+
+def _commanded(frame, arms):
+    """The file with commanded positions in m of the tools of arms (n,)."""
+    drives = frame[[*ROBOT.parts.columns]].to_numpy()
+    sent = np.array([two_arms.seen(q, arm) for q, arm in zip(drives, arms, strict=True)])
+    return frame.assign(**rows.vector_columns("command", sent / 1e3))
+
+
+def test_the_named_target_is_on_the_end_effector_of_the_pose(tmp_path):
+    frame = _file()
+    found = _ingested(_commanded(frame, frame["target"]), tmp_path)
+    same = _ingested(frame, tmp_path)
+    np.testing.assert_allclose(rows.vectors(found.measurements, "target"), rows.vectors(same.measurements, "target"))
+    wrong = frame["target"].to_numpy().copy()
+    wrong[7] = "right"
+    with pytest.raises(IngestError, match=r"row 9, .*command_x_mm.* nearest to another end effector than that of left"):
+        _ingested(_commanded(frame, wrong), tmp_path)
+
+
+def test_commanded_positions_do_not_replace_targets_or_drive_values(tmp_path):
+    frame = _commanded(_file(), _file()["target"])
+    with pytest.raises(IngestError, match="column target: got no such column; allowed: right, left"):
+        _ingested(frame.drop(columns="target"), tmp_path)
+    with pytest.raises(IngestError, match="a column for each drive"):
+        _ingested(frame.drop(columns=[*ROBOT.parts.columns]), tmp_path)

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rrru.campaign.ingest.outliers import flag_outliers, reproduced
+from rrru.campaign.ingest.outliers import flag_outliers, frequent_jumps, reproduced
 from tests.places import DATA
 
 NOISE_MM = 0.02
@@ -130,6 +130,40 @@ def test_uneven_spacing_is_taken_into_account():
     deviation = 6.0 * np.stack([place**3, np.sin(3.0 * place), place], axis=-1)
     deviation[9] += 2.0
     assert np.flatnonzero(flag_outliers(deviation, np.ones(len(place)), place=place)).tolist() == [9]
+
+
+@pytest.mark.parametrize("every", [3, 4, 6])
+def test_bad_points_too_many_to_be_marked_are_counted(every):
+    rng = np.random.default_rng(every)
+    deviation, bad = noisy(rng, smooth(rng)), np.arange(1, COUNT, every)
+    deviation[bad] += bad_block(rng, len(bad), 2.0)
+    assert flag_outliers(deviation, np.ones(COUNT)).sum() < 0.5 * len(bad)
+    # the ends are not judged
+    np.testing.assert_array_equal(
+        np.flatnonzero(frequent_jumps(deviation, np.ones(COUNT))), bad[(bad > 2) & (bad < 27)]
+    )
+
+
+def test_bad_points_at_random_are_nearly_all_counted():
+    counted, true, bad_inside = 0, 0, 0
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        deviation, bad = noisy(rng, smooth(rng)), rng.choice(COUNT, 7, replace=False)
+        deviation[bad] += bad_block(rng, 7, 4.0)
+        found = np.flatnonzero(frequent_jumps(deviation, np.ones(COUNT)))
+        counted, true = counted + len(found), true + len({*found} & {*bad})
+        bad_inside += ((bad > 2) & (bad < 27)).sum()
+    assert 0.9 * bad_inside < true <= counted < 1.1 * bad_inside
+
+
+def test_no_jumps_are_counted_where_few_or_none_are():
+    rng = np.random.default_rng(6)
+    deviation = noisy(rng, smooth(rng))
+    assert not frequent_jumps(deviation, np.ones(COUNT)).any()
+    deviation[[4, 20]] += 8.0
+    assert not frequent_jumps(deviation, np.ones(COUNT)).any()
+    deviation, run, _ = field("field_09.csv")
+    assert not frequent_jumps(deviation, run, NOISE_MM).any()
 
 
 def test_short_runs_are_not_judged_and_wrong_shapes_are_refused():

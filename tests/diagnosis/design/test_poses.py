@@ -93,6 +93,8 @@ class LocalCompliance:
     parameters: ParameterSet = EFFECTS["drive_compliance"].parameters
     coordinates: Coordinates = EFFECTS["drive_compliance"].coordinates
     needs: tuple = ()
+    along_drives = with_waves = None
+    switches = False
 
     def contribute(self, motion, values):
         """Changes (n, 3) of the drive angles."""
@@ -154,6 +156,8 @@ class ComplianceOutside:
     parameters: ParameterSet = find("drive_compliance", arms.ARM).parameters
     coordinates: Coordinates = find("drive_compliance", arms.ARM).coordinates
     needs: tuple = ()
+    along_drives = with_waves = None
+    switches = False
 
     def contribute(self, motion, values):
         """Changes (n, 6) of the drive angles."""

@@ -13,6 +13,7 @@ from rrru.campaign import measurements as rows
 from rrru.diagnosis.make_problem import make_case
 from rrru.errors import ConfigError
 from rrru.kinematics import singularity
+from rrru.robots.catalogue import make_mechanism
 from rrru.seeds import stream
 from rrru.simulation.virtual_robot import VirtualRobot
 from rrru.studies.blind_validation import draw
@@ -300,3 +301,12 @@ def test_files_that_the_check_has_no_places_in_are_refused(file, message):
     for key in ("files", "as_robots_are_files"):
         with pytest.raises(ConfigError, match=message):
             check(_CONFIG | {"withheld": section | {key: [file]}})
+
+
+@pytest.mark.parametrize(
+    ("dimensions", "reason"), [({"L3_mm": 500.0}, "out of reach"), ({"R_mm": 1.0}, "near a singularity")]
+)
+def test_dimensions_without_room_for_the_trajectories_are_refused(dimensions, reason):
+    small = make_mechanism("rrru3", dimensions)
+    with pytest.raises(ConfigError, match=rf"robots\.rrru3: of 200 drawn trajectories .* 200 are {reason}; allowed: "):
+        draw.bare("small", np.random.default_rng(0), small)

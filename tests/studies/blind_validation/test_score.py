@@ -291,7 +291,12 @@ def test_field_campaigns_are_scored_against_the_users_answers(tmp_path):
 
 @pytest.mark.parametrize(
     ("text", "message"),
-    [("campaign,effects\na,none\n", "lacks the columns leg"), ("campaign,effects,leg\na,nosuch,0\n", "'nosuch'")],
+    [
+        ("campaign,effects\na,none\n", "lacks the columns leg"),
+        ("campaign,effects,leg\na,nosuch,0\n", "'nosuch'"),
+        ("campaign,effects,leg\na,none,0\nb,backlash,two\n", "campaign b has the leg 'two'; allowed: 0 to 3"),
+        ("campaign,effects,leg\na,none,\nb,backlash,4\n", "campaign b has the leg '4'"),
+    ],
 )
 def test_answers_that_make_no_sense_are_refused(tmp_path, text, message):
     (tmp_path / "answers.csv").write_text(text)

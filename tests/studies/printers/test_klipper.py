@@ -86,6 +86,23 @@ def test_where_the_probe_sat_at_every_height(tmp_path):
     np.testing.assert_array_equal(found.height_drop_mm[0], found.height_drop_mm[1])
 
 
+def test_an_include_by_an_absolute_path_is_followed(tmp_path):
+    """As Klipper does; on another computer than the printer's, the file of this name next to printer.cfg."""
+    (tmp_path / "elsewhere").mkdir()
+    (tmp_path / "printer").mkdir()
+    probe = written(tmp_path / "elsewhere", "[bltouch]\nx_offset: -12\ny_offset: 20.5\nz_offset: 2.5\n", "probe.cfg")
+
+    def offsets(include):
+        text = config(ENTRIES["printer_16"], above=f"[include {include}]\n")
+        (found,) = files.read(written(tmp_path / "printer", text))
+        return found.probe_mm[~found.by_hand].tolist()
+
+    assert offsets(probe) == offsets(f"{probe.parent}/p*.cfg") and [-12.0, 20.5] in offsets(probe)
+    assert [-12.0, 20.5] not in offsets("/home/pi/printer_data/config/probe.cfg")
+    written(tmp_path / "printer", probe.read_text(), "probe.cfg")
+    assert offsets("/home/pi/printer_data/config/probe.cfg") == offsets(probe)
+
+
 @pytest.mark.parametrize(
     ("change", "words"),
     [

@@ -3,7 +3,7 @@ from pathlib import Path
 
 import rrru.report
 from rrru.errors import ConfigError
-from rrru.plugins import module_file
+from rrru.plugins import module_files, own_code_digest
 from rrru.store.digest import code_digest
 from rrru.pipeline import config as parts
 from rrru.pipeline.jobs.outputs import (
@@ -112,13 +112,13 @@ def diagnosed(wildcards):
 
 
 def own_effects_digests():
-    """Digests of these files, so that editing one reruns the affected jobs."""
-    return [hashlib.sha256(file.read_bytes()).hexdigest() for file in own_effects() if file.is_file()]
+    """Digest of these files, so that editing one reruns the affected jobs."""
+    return own_code_digest(parts.own_effects(config)) if own_effects() else []
 
 
 def own_effects():
     """The files that hold the user's own effects."""
-    return [module_file(name) for name in config["gap"]["own_effects"]]
+    return module_files(parts.own_effects(config))
 
 
 def paper_options():

@@ -20,6 +20,7 @@ rule compare_methods:
         robot="|".join(METHOD_ROBOTS),
     params:
         settings=lambda wildcards: method_parts.settings(config, wildcards.robot),
+        own_effects=own_effects_digests(),
         code=code("methods"),
     script:
         "../../scripts/methods.py"

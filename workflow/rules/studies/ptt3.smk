@@ -55,6 +55,7 @@ rule ptt_measure:
         f"{RESULTS}/logs/ptt_measure.log",
     params:
         settings=reads(*_MEASURED, "ptt.joint", "ptt.bench", "ptt.positions_mm"),
+        own_effects=own_effects_digests(),
         code=code("ptt_measure"),
     script:
         "../../scripts/ptt_measure.py"
@@ -71,6 +72,7 @@ rule ptt_compensate:
         f"{RESULTS}/logs/ptt_compensate.log",
     params:
         settings=reads(*_MEASURED, "ptt.network", "ptt.extrapolation", "ptt.redraws", "ptt.starts_deg"),
+        own_effects=own_effects_digests(),
         code=code("ptt_compensate"),
     script:
         "../../scripts/ptt_compensate.py"
