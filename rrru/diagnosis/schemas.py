@@ -45,7 +45,8 @@ noise_stated_mm        float? noise per axis as the configuration states it; nul
 noise_correlation      float  of the noise from point to point along a run, 0 to 1
 noise_runs_mm          float  offsets of the runs, 1 sigma per axis
 noise_from             str    given: by the configuration, as known; fitted: around what is stated, to what neither
-    calibration nor effects can fit; repeats: the same, as small as repeated points show it {given, repeats, fitted}
+    calibration nor effects can fit, and not below what is stated unless the data contradict that (p < 0.01); repeats:
+    the same, as small as repeated points show it {given, repeats, fitted}
 points                 int    points diagnosed
 dropped_points         int    outliers that the diagnosis left out
 notes                  str    what the data lack for a better answer; empty where nothing

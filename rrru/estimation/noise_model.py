@@ -28,7 +28,7 @@ import numpy.typing as npt
 from scipy.fft import dct
 from scipy.linalg import qr, toeplitz
 from scipy.optimize import minimize_scalar
-from scipy.special import expit
+from scipy.special import chdtr, expit, fdtrc
 
 from rrru.campaign.noise import along_runs
 
@@ -42,6 +42,8 @@ _STATED = 5.6
 _LEAST_AXIS = 1e-4
 # a stated noise is wrong by at most this factor: 1 sigma of its prior; beyond, it is contradicted
 CONTRADICTED = 1.3
+# a stated noise is too large where a true one would leave so small residuals with this probability; assumed
+_MAX_P_OF_STATED = 0.01
 # residual degrees of freedom after all that may be fitted, for the noise to be estimated within some 20 %
 MIN_FREE_NUMBERS = 15.0
 # free means of series, of three numbers each, for offsets between them to show: those of two series
@@ -106,6 +108,11 @@ class NoiseModel:
     def counted(self) -> Self:
         """The model under which the readings count as independent."""
         return replace(self, axis_mm=self.axis_mm * np.sqrt(self.alike), alike=1.0)
+
+    def of_size(self, noise_mm: float) -> Self:
+        """The model of another `mean_mm`, with the same discrepancy in mm."""
+        ratio = noise_mm / self.mean_mm
+        return replace(self, axis_mm=self.axis_mm * ratio, discrepancy=self.discrepancy / ratio)
 
     def whitening(
         self, series: npt.ArrayLike, discrepancy: Callable[[FloatArray], FloatArray] | None = None
@@ -182,7 +189,7 @@ def fit_noise(
     stated_mm: stated s.d. per axis, None where none is; repeats: s.d. per axis of poses that were measured several
     times and its degrees of freedom, which count where the columns leave few degrees of freedom, None for none;
     discrepancy: from half-wave numbers (m,) to variances (m,), 1 on average, of a smooth discrepancy along the series
-    that is not noise, None for none.
+    that is not noise, None for none. A stated size that is not significantly above what is found is the result's.
     """
     together, wave = along_runs(np.concatenate([columns, data[..., None]], axis=-1), series)
     length, model, instrument_mm = lengths(series), NoiseModel.white(stated_mm or 1.0), stated_mm
@@ -201,7 +208,17 @@ def fit_noise(
         new, old = ([*m.axis_mm, m.correlation, m.offset, m.discrepancy] for m in (model, last))
         if np.allclose(new, old, rtol=1e-2, atol=1e-2 * model.mean_mm):
             break
+    if stated_mm and model.mean_mm < stated_mm and not _too_large(stated_mm, model.mean_mm, seen.free):
+        return model.of_size(stated_mm)
     return model
+
+
+def _too_large(stated_mm: float, found_mm: float, freedom: float) -> bool:
+    """Whether a stated noise contradicts a smaller one that residuals of so many degrees of freedom show.
+
+    Under the stated noise f found^2 / stated^2 follows a chi-square distribution of f degrees of freedom.
+    """
+    return bool(chdtr(freedom, freedom * (found_mm / stated_mm) ** 2) < _MAX_P_OF_STATED)
 
 
 def high_frequency_noise(
@@ -217,6 +234,21 @@ def high_frequency_noise(
     left, share = _left(flat[:, -1], flat[:, :-1])
     seen = _Seen((left**2).reshape(-1, 3), share.reshape(-1, 3), wave, lengths(series))
     return seen.rough(chosen)
+
+
+def p_value(data: FloatArray, columns: FloatArray, block: FloatArray) -> float:
+    """The p value of the F test of a block (m, 3, c) in addition to columns (m, 3, k), of data (m, 3) of equal noises.
+
+    1 where the columns hold the block; see `rrru.estimation.f_test`.
+    """
+    flat = np.concatenate([columns, block], axis=-1).reshape(data.size, -1)
+    (left, share), (without, its_share) = (_left(data.ravel(), part) for part in (flat, flat[:, : columns.shape[-1]]))
+    freedom, rank = round(float(share.sum())), round(float((its_share - share).sum()))
+    if rank < 1 or freedom < 1:
+        return 1.0
+    unexplained = float(left @ left)
+    ratio = (float(without @ without) - unexplained) / rank * freedom / max(unexplained, 1e-300)
+    return float(fdtrc(rank, freedom, max(ratio, 0.0)))
 
 
 def alike(data: FloatArray, columns: FloatArray, stop: npt.NDArray[np.int_], kind: npt.NDArray[np.int_]) -> float:
