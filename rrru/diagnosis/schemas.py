@@ -30,7 +30,7 @@ searches_apart         float  largest difference of a cause's probability betwee
 noise_rms_mm
 gap_rms_mm             float  residual error of the calibrated model, noise subtracted
 gap_after_rms_mm       float  the same, expected of the corrected model on held-out runs
-share_closed           float  share of the gap that the effects close, 0 to 1; below 0 where the correction makes it
+share_closed           float  explained fraction of the mean square gap, 0 to 1; below 0 where the correction makes it
     worse, on held-out runs
 share_closed_low       float  lower end, 95 %, 0 to 1; below 0 where the correction makes it worse, on held-out runs
 share_closed_high      float  upper end, 95 %, 0 to 1; below 0 where the correction makes it worse, on held-out runs
@@ -173,7 +173,7 @@ max_mm                 float  largest distance
 noise_rms_mm
 gap_rms_mm             float  rms with the noise taken out, 0 at least; at the last held-out step the error to expect
     from the fitted numbers' uncertainty, mixed with that by the probability that something is unexplained
-share_closed           float? share of the gap that the effects close, 0 to 1; below 0 where the correction makes it
+share_closed           float? explained fraction of the mean square gap, 0 to 1; below 0 where the correction makes it
     worse; null at step 0 and where there is no gap
 share_closed_low       float? lower end, 95 %, 0 to 1; below 0 where the correction makes it worse; null at step 0 and
     where there is no gap

@@ -299,7 +299,7 @@ def _holds(ends, true, digit=0.0):
 
 def _closed(stated, truth, _facts):
     """Interval of the fraction of the gap at fresh stops that the verdict's effects explain."""
-    return _holds(stated["ends"], 1.0 - truth.after_mm / truth.before_mm, _PRINTED) if truth.before_mm else None
+    return _holds(stated["ends"], 1.0 - (truth.after_mm / truth.before_mm) ** 2, _PRINTED) if truth.before_mm else None
 
 
 def _budget(stated, truth, _facts):
