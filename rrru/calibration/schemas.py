@@ -19,8 +19,8 @@ max_mm                 float  largest distance
 turn_rms_rad           float? root mean square angle between measured and model orientations; null where none was
     measured
 noise_mm               float  noise per axis that the standard errors assume
-noise_from             str    given: by the configuration or of the whole campaign, see campaigns; residuals: of
-    this fit, where these are larger {given, residuals}
+noise_from             str    campaign: that of the whole campaign, whose source is in campaigns; residuals: of this
+    fit, where these are larger {campaign, residuals}
 rank                   int    parameter combinations that the points determine, of 7
 condition              float  condition number of the scaled Jacobian (angles as arcs at the robot's own length)
 O1_observability       float  geometric mean of the singular values over sqrt(points)

@@ -218,6 +218,8 @@ class DiagnosisOptions:
     max_listed_sets: int = 20
     # a text that lists more fitted numbers says how many there are; the table has them; assumed
     max_listed_numbers: int = 3
+    # a compliance whose interval has an end below this share of its value may be zero and is not listed; assumed
+    min_compliance_ratio: float = 1e-3
     # a share of the gap that is worth a sentence; assumed
     min_mentioned_share: float = 0.05
     # a cause of a smaller share of the gap, or of a smaller size over the noise, is in the table only; assumed

@@ -153,7 +153,7 @@ def campaigns(z_down=True):
     row = {
         c.name: 1 if c.kind == "int64" else 1.0 for c in TABLES["campaigns"].columns if c.kind in ("int64", "float64")
     }
-    facts = {"robot": "made_up", "source": "made up", "noise_from": "given", "notes": ""}
+    facts = {"robot": "made_up", "source": "made up", "noise_from": "given", "noise_rad_from": "", "notes": ""}
     return check("campaigns", pd.DataFrame([row | facts | {"campaign": CAMPAIGN, "z_down": z_down}]))
 
 
@@ -187,7 +187,7 @@ def calibrations():
         for c in TABLES["calibrations"].columns
         if c.kind in ("int64", "float64")
     }
-    labels = {"campaign": CAMPAIGN, "method": OPTIONS["method"], "noise_from": "given"}
+    labels = {"campaign": CAMPAIGN, "method": OPTIONS["method"], "noise_from": "campaign"}
     rows = [numbers | labels | {"calibration": name, "mean_mm": OPTIMUM_MM} for name in SETS]
     return check("calibrations", pd.DataFrame(rows))
 

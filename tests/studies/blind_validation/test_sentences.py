@@ -235,7 +235,7 @@ _NEVER = {
     *("these data cannot rule out", "next, nothing would settle it", "the fit did not converge"),
     *("runs are limited", "causes by share", "no cause is sure"),
     *("an effect is not tested", "the file is not corrected", "how the file was driven", "a part of a sentence"),
-    "a reflector is assumed",
+    *("a reflector is assumed", "masses are unknown"),
     *("the effects are confounded", "a zero is confounded", "a zero is not determined", "a weight is confounded"),
     *(f"interval of a share: {kind}" for kind in ("covariance", "sampling", "calibration")),
 }

@@ -473,6 +473,7 @@ _JUDGES = {
     "an effect needs different values": _needs_different,
     "an effect is a calibration's number": lambda stated, t, _: stated["name"] not in t.effects,
     "an effect is absorbed": _absorbed,
+    "masses are unknown": _undecided,
     "an effect is not tested": _undecided,
     "runs are limited": _undecided,
     "the file leaves": _file_leaves,
