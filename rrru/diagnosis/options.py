@@ -250,8 +250,9 @@ class DiagnosisOptions:
     max_advised_trajectories: int = 4
     max_advised_rivals: int = 3
     max_advised_poses: int = 10
-    # less expected log Bayes factor than this is not worth a run; assumed
-    min_run_gain_nats: float = 0.2
+    # less expected log Bayes factor than this is not worth a run: it is "not worth more than a bare mention" (Kass and
+    # Raftery, Bayes factors, Journal of the American Statistical Association 90, 1995)
+    min_run_gain_nats: float = 1.0
     # as much makes a rival 20 times less probable, which rules it out
     decisive_gain_nats: float = 3.0
     # points that are read on a short pass, and its length; assumed
