@@ -13,6 +13,7 @@ from rrru.diagnosis.settings import GapSettings
 from rrru.diagnosis.verdict_text import answer
 from rrru.effects import drive_error_function
 from rrru.effects.library import find
+from rrru.robots.from_dh import from_dh
 from tests.diagnosis import arms
 
 _EFFECTS = (
@@ -180,3 +181,31 @@ def test_a_compliance_has_a_size_only_where_the_masses_are_stated(payload_kg):
     assert all("mrad/(N m)" not in one and "Its size is not determined" in one for one in causes)
     untested = [note for note in said["notes"] if note.startswith("drive_compliance not tested: needs a load")]
     assert bool(untested) == (payload_kg == 0.0)
+
+
+@pytest.mark.parametrize("grown", [(1,), (0, 1, 2, 3, 5)], ids=["one link", "all links"])
+def test_a_link_that_grows_alone_is_told_from_a_robot_that_grows(grown):
+    """Poses of robots made anew from rows of DH numbers, whose lengths grow with the time of each stop."""
+    strain, constant_s, count = 4e-4, 1200.0, 120
+    drive, time = arms.drives(count, np.random.default_rng(6)), 30.0 * np.arange(count)
+    frame = arms.commands(drive).assign(time_s=time, payload_kg=0.0)
+    position = np.empty((count, 3))
+    for k, t in enumerate(time):
+        longer = 1.0 + strain * -np.expm1(-t / constant_s)
+        lengths = [
+            {key: value * longer for key, value in row.items() if key in ("a_mm", "d_mm") and number in grown}
+            for number, row in enumerate(arms._ROWS)
+        ]
+        rows_now = [row | changed for row, changed in zip(arms._ROWS, lengths, strict=True)]
+        position[k] = from_dh(rows_now, name="six_axis", tool_mm=arms.ARM.tool_mm).forward(drive[k : k + 1])[0]
+    position += arms.NOISE_MM * np.random.default_rng(7).standard_normal(position.shape)
+    frame = frame.assign(**rows.vector_columns("measured", position))
+    settings = GapSettings(("thermal_growth", "link_growth", "base_drift", "encoder_eccentricity"), draws=20)
+    found = diagnose(frame, MeasuredRobot(arms.reading(frame), arms.MASSES, arms.NOISE_MM), settings)
+    name, parameter = ("link_growth", "strain2") if len(grown) == 1 else ("thermal_growth", "strain")
+    assert found.verdict["effects"] == name
+    numbers = found.tables["gap_parameters"].query("effect == @name").set_index("parameter")
+    assert numbers.loc[parameter, "low_95"] < strain < numbers.loc[parameter, "high_95"]
+    assert numbers.loc["time_constant", "low_95"] < constant_s < numbers.loc["time_constant", "high_95"]
+    if len(grown) == 1:
+        assert found.verdict["leg"] == 2
