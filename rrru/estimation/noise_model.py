@@ -377,7 +377,8 @@ class _Seen:
 
     def most_likely(self, instrument_mm: float, known: Sequence[tuple[float, float]]) -> NoiseModel:
         """The NoiseModel of the posterior mean of correlation and offset, over a grid, and the likeliest sizes."""
-        sizes = _DISCREPANCIES if self._smooth.any() else _DISCREPANCIES[:1]
+        most = self._largest_discrepancy(known)
+        sizes = _DISCREPANCIES[most >= _DISCREPANCIES]
         largest = (CONTRADICTED * instrument_mm) ** 2
         prior = np.full(len(sizes), _SOME_DISCREPANCY / max(len(sizes) - 1, 1))
         prior[0] = 1.0 - _SOME_DISCREPANCY
@@ -387,12 +388,23 @@ class _Seen:
         if best:
             found = minimize_scalar(
                 lambda octaves: -self._over_grid(2.0**octaves, largest, known).evidence,
-                bounds=np.log2(size) + np.array([-1.0, 1.0]),
+                bounds=(np.log2(size) - 1.0, min(np.log2(size) + 1.0, np.log2(most))),
                 method="bounded",
                 options={"xatol": _OCTAVES},
             )
             size = float(2.0**found.x)
         return self._mean(self._over_grid(size, largest, known), known)
+
+    def _largest_discrepancy(self, known: Sequence[tuple[float, float]]) -> float:
+        """Upper limit of the discrepancy over the noise.
+
+        Where nothing is known of the noise the readings at the highest frequencies show it, and at most half of their
+        variance may be the discrepancy's. Without a limit its white part could explain them alone, with no noise.
+        """
+        if not self._smooth.any():
+            return 0.0
+        highest = float(self._smooth[self._smooth > 0.0].min())
+        return float("inf") if known else 1.0 / np.sqrt(max(highest, 1e-12))
 
     def _over_grid(self, size: float, largest: float, known: Sequence[tuple[float, float]]) -> "_Grid":
         """Posterior of correlation and offset where the discrepancy has so many times the noise's deviation.

@@ -170,3 +170,20 @@ def test_a_noise_that_is_known_is_not_fitted():
     verdict = diagnose(measure((strong("drive_compliance", 4.0),)), known).verdict
     assert verdict["effects"] == "drive_compliance" and verdict["noise_from"] == "given"
     assert verdict["noise_rms_mm"] == pytest.approx(np.sqrt(3.0) * NOISE_MM) and verdict["noise_correlation"] == 0.0
+
+
+@pytest.mark.parametrize("size", [3.0, 10.0, 50.0])
+@pytest.mark.parametrize("count", [0, 300])
+def test_a_noise_that_is_not_stated_is_not_explained_by_a_discrepancy(size, count):
+    """Of a large discrepancy the white part alone explains the highest frequencies; no noise is then no estimate.
+
+    It was below 0.85 of the true one in 19 of 40 draws with a discrepancy of 10 times the noise.
+    """
+    wave, found = half_waves(_SERIES), []
+    for seed in range(8):
+        generator = np.random.default_rng(seed)
+        columns = _columns(generator, count) if count else np.zeros((len(_SERIES), 3, 0))
+        cosines = generator.standard_normal((len(_SERIES), 3)) * np.sqrt(spectrum(wave))[:, None] * size * NOISE_MM
+        data = _from_cosines(cosines) + NOISE_MM * generator.standard_normal(cosines.shape)
+        found.append(fit_noise(data, columns, _SERIES, None, discrepancy=spectrum).mean_mm)
+    assert min(found) > 0.85 * NOISE_MM
