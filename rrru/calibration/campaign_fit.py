@@ -112,6 +112,7 @@ def _calibration_row(fit: Calibration) -> pd.DataFrame:
         "max_mm": distance.max(),
         "turn_rms_rad": fit.turn_rms_rad,
         "noise_mm": fit.noise_mm,
+        # what a calibration is given is the noise of the campaign, which may itself be an estimate
         "noise_from": "campaign" if fit.noise_from == "given" else fit.noise_from,
         "rank": ident.rank,
         "condition": ident.condition,

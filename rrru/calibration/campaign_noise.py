@@ -15,11 +15,15 @@ from rrru.kinematics.robot import Robot
 
 
 class Noise(NamedTuple):
-    """Noise per axis of positions in mm and of orientations in rad, NaN where none were measured, and its source."""
+    """Noise per axis of positions in mm and of orientations in rad, NaN where none were measured, and their sources.
+
+    rad_source: "given", "high_frequency" or, where no orientations were measured, "".
+    """
 
     mm: float
     rad: float
     source: str
+    rad_source: str = ""
 
     @property
     def arm_mm(self) -> float:
@@ -44,18 +48,23 @@ def campaign_noise(
         noise_mm, known = read_noise(measurements), "readings"
     turned = rows.has_turns(measurements)
     if noise_mm is not None and (noise_rad or not turned):
-        return Noise(noise_mm, noise_rad if noise_rad and turned else np.nan, known)
+        return Noise(noise_mm, noise_rad, known, "given") if noise_rad and turned else Noise(noise_mm, np.nan, known)
     residuals = select(measurements, robot, ["*"], use_near_singularity, robot.angle_arm_mm)
     if residuals is None:
         raise ConfigError("too few usable points to estimate noise_mm; give it")
     fit, used = calibrate(residuals), measurements[rows.usable(measurements, use_near_singularity)]
     left, columns = residuals.residual(fit.deviations), residuals.jacobian(fit.deviations)
     series, positions = reading_series(used, residuals.readings), np.arange(len(left)) < len(used)
-    found_rad = noise_rad or high_frequency_noise(left, columns, series, ~positions) / robot.angle_arm_mm
+    found_rad, rad_source = np.nan, ""
+    if turned:
+        found_rad = noise_rad or high_frequency_noise(left, columns, series, ~positions) / robot.angle_arm_mm
+        rad_source = "given" if noise_rad else "high_frequency"
     if noise_mm is not None:
-        return Noise(noise_mm, found_rad, known)
+        return Noise(noise_mm, found_rad, known, rad_source)
     found_mm = high_frequency_noise(left, columns, series, positions)
     if np.isnan(found_mm):
         raise ConfigError("too few usable points to estimate noise_mm; give it")
     repeated = quieter_repeats(used, found_mm)
-    return Noise(found_mm, found_rad, "high_frequency") if repeated is None else Noise(repeated, found_rad, "repeats")
+    if repeated is None:
+        return Noise(found_mm, found_rad, "high_frequency", rad_source)
+    return Noise(repeated, found_rad, "repeats", rad_source)

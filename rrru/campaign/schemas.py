@@ -102,10 +102,12 @@ near_singularity       int    points with status near_singularity
 unsolved               int    points with status unsolved
 noise_mm               float  measuring noise per axis, 1 sigma
 noise_rad              float? noise of measured orientations per axis, 1 sigma; null where none was measured
-noise_from             str    given: by the configuration; readings: median of what the file states of each reading;
-    repeats: pooled over repeated points; high_frequency: from the residuals along the path of a fit of all points,
-    which has the robot's systematic errors in it where the poses follow no path {given, readings, repeats,
+noise_from             str    of noise_mm, given: by the configuration; readings: median of what the file states of each
+    reading; repeats: pooled over repeated points; high_frequency: from the residuals along the path of a fit of all
+    points, which has the robot's systematic errors in it where the poses follow no path {given, readings, repeats,
     high_frequency}
+noise_rad_from         str    of noise_rad, given: by the configuration; high_frequency: as that of positions; empty
+    where no orientation was measured
 platform_mass_kg       float? the real robot's platform, as given; null where it was not
 registration_rms_mm    float? rms of the distance in space from the commanded points after the frame registration,
     before any calibration: errors of the robot's geometry are in it; null where the frame was the robot's

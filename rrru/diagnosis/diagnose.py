@@ -32,6 +32,7 @@ from rrru.diagnosis.posterior import Posterior
 from rrru.diagnosis.remainder import NO_REMAINDER, followed_alike, remainder_rows
 from rrru.diagnosis.result_notes import (
     fit_notes,
+    mass_notes,
     noise_notes,
     payload_notes,
     posterior_notes,
@@ -176,6 +177,7 @@ def _notes(inference: InferenceResult, stated_mm: float | None, excluded: pd.Dat
         where_not = f"{lacking} of {case.count} points, where the rows do not determine all that is needed"
         yield f"{', '.join(sorted(acting))} fitted without {where_not}"
     yield from noise_notes(case, stated_mm, CONTRADICTED)
+    yield from mass_notes(case)
     for effect, note in case.untestable.items():
         yield f"{effect} not tested: {note}"
 

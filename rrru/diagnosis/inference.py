@@ -24,7 +24,7 @@ from rrru.diagnosis.state import State
 from rrru.diagnosis.terms import each_leg
 from rrru.diagnosis.whitened import DISCREPANCY_SCALES, spectrum
 from rrru.errors import FitError
-from rrru.estimation.noise_model import MIN_FREE_NUMBERS, alike, fit_noise, high_frequency_noise
+from rrru.estimation.noise_model import MIN_FREE_NUMBERS, alike, fit_noise, high_frequency_noise, p_value
 
 # what the configuration says of the noise
 KNOWN, STATED, UNKNOWN_NOISE = "known", "stated", "unknown"
@@ -112,7 +112,7 @@ def with_noise(case, linear, stated_mm):
     model = replace(model, alike=alike(data, columns, case.stop[complete], case.kind[complete]))
     repeated = noise.quieter_repeats(case.measurements[case.used], model.mean_mm, model.correlation)
     if repeated is not None:
-        return case.under(replace(model, axis_mm=model.axis_mm * repeated / model.mean_mm)), "repeats"
+        return case.under(model.of_size(repeated)), "repeats"
     return case.under(model), "fitted"
 
 
@@ -125,11 +125,37 @@ def _noise_columns(case, linear, known):
     calibration are used.
     """
     blocks = {key: columns for key, columns in linear.columns.items() if key[0] in case.library}
+    searched = {key: blocks.pop(key) for key in [*blocks] if _is_searched(case.library[key[0]].coordinates, key[1])}
     for chosen in _fewer_blocks(linear, blocks, case.library):
         columns = np.concatenate([linear.base, *chosen.values(), *linear.shape_columns.values()], axis=-1)
-        if linear.data.size - columns.shape[-1] >= max(MIN_FREE_NUMBERS, OPTIONS.min_free_share * linear.data.size):
-            return columns
+        if _leaves_enough(linear, columns):
+            return _with_significant(case, linear, columns, searched)
     return columns if known else linear.base
+
+
+def _leaves_enough(linear, columns):
+    """Whether columns (m, 3, k) leave enough of the numbers for an estimate of the noise."""
+    return linear.data.size - columns.shape[-1] >= max(MIN_FREE_NUMBERS, OPTIONS.min_free_share * linear.data.size)
+
+
+def _is_searched(coordinates, shape):
+    """Whether a shape of an effect was found in these data, see `rrru.diagnosis.harmonic_orders`."""
+    return coordinates.searched is not None and 0 < coordinates.stated <= shape
+
+
+def _with_significant(case, linear, columns, searched):
+    """Columns (m, 3, k), and those of each shape that was searched for that explain more than noise does.
+
+    The best of many orders explains more of pure noise than its number of columns: with it the noise would be found
+    too low. The F test is at a level that the prior probabilities of the orders share out (weighted Bonferroni:
+    Genovese, Roeder and Wasserman, False discovery control with p-value weighting, Biometrika 93, 2006).
+    """
+    for (name, shape), block in searched.items():
+        together = np.concatenate([columns, block], axis=-1)
+        level = OPTIONS.max_searched_order_p * case.library[name].coordinates.weights[shape]
+        if _leaves_enough(linear, together) and p_value(linear.data, columns, block) < level:
+            columns = together
+    return columns
 
 
 def _fewer_blocks(linear, blocks, library):

@@ -26,10 +26,13 @@ from rrru.diagnosis.payload_nuisance import nuisance_priors
 from rrru.diagnosis.problem import Case
 from rrru.diagnosis.stop_paths import paths_between_stops, undetermined_senses
 from rrru.effects.motion import Course, make_motion
-from rrru.effects.protocol import PATH, complete_rows, known_values
+from rrru.effects.protocol import LOADS, PATH, complete_rows, known_values
 from rrru.errors import FitError
 from rrru.estimation.starts import register_measurements
+from rrru.kinematics.dynamics import carried_kg
 
+# why an effect that bears load is not tested where nothing loads it
+UNLOADED = "needs a load of the parts that deflect, and neither a stated mass nor payload_kg gives one"
 # which points are used, in words
 _USABLE = "allowed: measured points within reach that are no outliers"
 
@@ -61,7 +64,14 @@ def make_case(measurements, mechanism, masses, noise_mm, library, use_near_singu
     sizes = float(noise_mm), float(arm_mm)
     nuisance_sd, bounds = nuisance_priors(motion, masses)
     more = {"motion_at": motion_at, "known": known, "nuisance_sd": nuisance_sd, "bounds": bounds}
+    more["massless"] = _lacks_masses(mechanism, masses)
     return Case(mechanism, measurements, motion, used, testable, untestable, *sizes, **more)
+
+
+def _lacks_masses(mechanism, masses):
+    """Whether no mass of a robot is stated whose links have masses of their own."""
+    own = getattr(mechanism, "point_masses", None)
+    return own is not None and not own and not carried_kg(mechanism, masses, np.zeros(1)).any()
 
 
 def _tested(library, motion, used, count):
@@ -98,6 +108,8 @@ def _lacking(effect, motion, used):
     alike = [name for name, value in known.items() if not np.ptp(value, axis=0).any()]
     if "drive_rate" in alike and not known["drive_rate"].any():
         return "needs drive_rate, which is zero: the robot rests at every point"
+    if any(name in LOADS and not known[name].any() for name in alike):
+        return UNLOADED
     if alike:
         return f"needs {', '.join(alike)} of more than one value"
     return "" if complete_rows(effect, motion)[used].any() else no_approach(used)

@@ -60,6 +60,8 @@ class DiagnosisOptions:
     # --- noise and linearisation ---
     # share of the numbers read that the fitted columns leave, so that each reading still shows its noise; assumed
     min_free_share: float = 0.1
+    # probability that noise alone adds an order of a search to the columns that the noise is estimated after; assumed
+    max_searched_order_p: float = 0.01
     # rounds of leaving out outliers; assumed
     max_outlier_rounds: int = 3
     # rounds of search and fit until the best hypothesis stays; assumed
@@ -216,6 +218,8 @@ class DiagnosisOptions:
     max_listed_sets: int = 20
     # a text that lists more fitted numbers says how many there are; the table has them; assumed
     max_listed_numbers: int = 3
+    # a compliance whose interval has an end below this share of its value may be zero and is not listed; assumed
+    min_compliance_ratio: float = 1e-3
     # a share of the gap that is worth a sentence; assumed
     min_mentioned_share: float = 0.05
     # a cause of a smaller share of the gap, or of a smaller size over the noise, is in the table only; assumed
@@ -246,8 +250,9 @@ class DiagnosisOptions:
     max_advised_trajectories: int = 4
     max_advised_rivals: int = 3
     max_advised_poses: int = 10
-    # less expected log Bayes factor than this is not worth a run; assumed
-    min_run_gain_nats: float = 0.2
+    # less expected log Bayes factor than this is not worth a run: it is "not worth more than a bare mention" (Kass and
+    # Raftery, Bayes factors, Journal of the American Statistical Association 90, 1995)
+    min_run_gain_nats: float = 1.0
     # as much makes a rival 20 times less probable, which rules it out
     decisive_gain_nats: float = 3.0
     # points that are read on a short pass, and its length; assumed

@@ -42,7 +42,7 @@ class Case:
     others; motion_at: from where the robot stands to the motion with the loads there, see
     `rrru.effects.motion.make_motion`; nuisance_sd, bounds: of the errors of payload and tilt, see
     `rrru.diagnosis.payload_nuisance`; known: effect to the points (N,) at which the campaign has all that the effect
-    needs, of the effects that lack something at a used point.
+    needs, of the effects that lack something at a used point; massless: whether no mass of the robot itself is stated.
     """
 
     mechanism: object
@@ -59,6 +59,7 @@ class Case:
     nuisance_sd: dict = field(default_factory=dict)
     bounds: dict = field(default_factory=dict)
     known: dict = field(default_factory=dict)
+    massless: bool = False
 
     def __len__(self):
         return len(self.at)

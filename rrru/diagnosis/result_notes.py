@@ -4,11 +4,18 @@ import numpy as np
 
 from rrru.campaign.ingest.zero_offsets import LARGE
 from rrru.campaign.noise import repeat_noise
+from rrru.diagnosis.make_problem import UNLOADED
 from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.payload_nuisance import WEIGHT
 from rrru.diagnosis.problem import GEOMETRY
+from rrru.effects.protocol import bears_load
 from rrru.kinematics.legs import WORLD
 
+# said where an effect depends on loads of a robot whose file states no masses: words that the size is not shown then
+MASSES_UNKNOWN = (
+    "no masses of the links are stated: without them no size of a compliance is determined, and the weight of the "
+    "links may appear as another effect, state them in the robot's file (`inertial`, or `mass_kg` of a row of `dh`)"
+)
 # said where a part of the gap looks like random error and no pose was measured under the same conditions again
 REPEATABILITY_UNKNOWN = "repeatability is unknown: no pose was measured twice"
 
@@ -85,6 +92,13 @@ def undetermined_payload_notes(inference):
             yield f"{what} and a compliance are not separately identifiable from these readings: {do}"
 
 
+def mass_notes(case):
+    """The sentence that loads are not known, where an effect needs them and the links of the robot have no masses."""
+    untested = {name for name, why in case.untestable.items() if why == UNLOADED}
+    if case.massless and (untested or any(bears_load(effect) for effect in case.effects.values())):
+        yield MASSES_UNKNOWN
+
+
 def _significant_nuisance(inference):
     """Name, unit, value, 95 % interval and whether determined, of each significant error of payload and tilt.
 
@@ -93,7 +107,8 @@ def _significant_nuisance(inference):
     """
     fit, case = inference.fit, inference.case
     estimate, weight = fit.estimate, fit.weight
-    if not weight:
+    if not weight or case.massless:
+        # an error of the payload would be the weight of the links
         return
     block = estimate.parameters.places[WEIGHT]
     shares, intervals = estimate.prior_shares[block], estimate.intervals[block]

@@ -30,7 +30,7 @@ searches_apart         float  largest difference of a cause's probability betwee
 noise_rms_mm
 gap_rms_mm             float  residual error of the calibrated model, noise subtracted
 gap_after_rms_mm       float  the same, expected of the corrected model on held-out runs
-share_closed           float  share of the gap that the effects close, 0 to 1; below 0 where the correction makes it
+share_closed           float  explained fraction of the mean square gap, 0 to 1; below 0 where the correction makes it
     worse, on held-out runs
 share_closed_low       float  lower end, 95 %, 0 to 1; below 0 where the correction makes it worse, on held-out runs
 share_closed_high      float  upper end, 95 %, 0 to 1; below 0 where the correction makes it worse, on held-out runs
@@ -45,7 +45,8 @@ noise_stated_mm        float? noise per axis as the configuration states it; nul
 noise_correlation      float  of the noise from point to point along a run, 0 to 1
 noise_runs_mm          float  offsets of the runs, 1 sigma per axis
 noise_from             str    given: by the configuration, as known; fitted: around what is stated, to what neither
-    calibration nor effects can fit; repeats: the same, as small as repeated points show it {given, repeats, fitted}
+    calibration nor effects can fit, and not below what is stated unless the data contradict that (p < 0.01); repeats:
+    the same, as small as repeated points show it {given, repeats, fitted}
 points                 int    points diagnosed
 dropped_points         int    outliers that the diagnosis left out
 notes                  str    what the data lack for a better answer; empty where nothing
@@ -174,7 +175,7 @@ max_mm                 float  largest distance
 noise_rms_mm
 gap_rms_mm             float  rms with the noise taken out, 0 at least; at the last held-out step the error to expect
     from the fitted numbers' uncertainty, mixed with that by the probability that something is unexplained
-share_closed           float? share of the gap that the effects close, 0 to 1; below 0 where the correction makes it
+share_closed           float? explained fraction of the mean square gap, 0 to 1; below 0 where the correction makes it
     worse; null at step 0 and where there is no gap
 share_closed_low       float? lower end, 95 %, 0 to 1; below 0 where the correction makes it worse; null at step 0 and
     where there is no gap

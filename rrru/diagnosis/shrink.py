@@ -97,7 +97,7 @@ def shrink_steps(inference, ordered, generator, draws):
 
 
 def share_closed(before, after):
-    """Share of the gap closed between two steps and its 95 % interval from their draws; zero where there was no gap."""
+    """Explained fraction between two steps and its 95 % interval from their draws; zero where there was no gap."""
     share = _share(before.gap_rms_mm, after.gap_rms_mm)
     drawn = zip(before.drawn_rms_mm, after.drawn_rms_mm, strict=True)
     pairs = [_share(*pair) for pair in drawn if np.isfinite(pair).all()]
@@ -161,5 +161,5 @@ def _sizes(residual_mm):
 
 
 def _share(before, after):
-    """1 - after / before, not below -1; zero where there was no gap."""
-    return max(1.0 - after / before, -1.0) if before > 0.0 else 0.0
+    """Reduction of the mean square from one rms to another, not below -1; zero where there was no gap."""
+    return max(1.0 - (after / before) ** 2, -1.0) if before > 0.0 else 0.0

@@ -7,7 +7,7 @@ import numpy as np
 
 from rrru.diagnosis.design.run_limits import NO_PAYLOAD, WITHIN_LIMITS
 from rrru.diagnosis.options import OPTIONS
-from rrru.diagnosis.result_notes import REPEATABILITY_UNKNOWN
+from rrru.diagnosis.result_notes import MASSES_UNKNOWN, REPEATABILITY_UNKNOWN
 from rrru.diagnosis.verdict import POSSIBLE
 from rrru.effects.causes import cause_texts
 from rrru.robots.drive_words import DriveWords
@@ -34,6 +34,7 @@ _READABLE = {"1": ("", 1.0), "rad/(N mm)": ("µrad/(N m)", 1e9), "mm/(N mm)": ("
 _READABLE |= {"mm/N": ("µm/N", 1e3), "1/K": ("µm/(m K)", 1e6), "mm/s": ("µm/s", 1e3), "rad/s": ("µrad/s", 1e6)}
 _LIMITED = (NO_PAYLOAD, WITHIN_LIMITS)
 _UNSURE = "No cause is probable enough to be named; the most probable answer follows."
+_NO_SIZE = "Its size is not determined, because no masses of the links are stated."
 _RANDOM = "random error above the stated noise. Repeatability is unknown: no pose was measured twice."
 
 
@@ -216,7 +217,8 @@ def _causes(facts):
     said = [_by_share(facts, groups, len(small))] if with_shares and len(facts["effects"]) > 1 else []
     said = ([_UNSURE] if any(effect["decision"] == POSSIBLE for effect in single) else []) + said
     single = [effect for effect in single if effect["name"] not in small]
-    said += [_cause(effect, "" if number else " of the gap", with_shares) for number, effect in enumerate(single)]
+    of_gap = [" of the gap"] + [""] * len(single)
+    said += [_cause(effect, of, with_shares, facts) for effect, of in zip(single, of_gap, strict=False)]
     said += [_of_group(group, with_shares) for group in groups.values()]
     if not with_shares and said:
         small = facts["gap_rms_mm"] <= facts["noise_rms_mm"]
@@ -306,17 +308,24 @@ def _shares_are_determined(facts):
     return facts["gap_rms_mm"] > 0.0 and max(shares) <= OPTIONS.max_mentioned_share
 
 
-def _cause(effect, follow, with_shares):
+def _cause(effect, follow, with_shares, facts):
     """One effect: its share, or its size where shares are not determined, name, leg, sizes and meaning."""
     share = "Also there is"
     if effect["share"] is not None:
         share = f"{share_with_interval(effect, follow)} is" if with_shares else f"{rounded(effect['rms_mm'])} mm is"
     place = f" {effect['place']}" if effect["place"] else ""
-    sizes = _sizes(effect["parameters"])
+    unsized = MASSES_UNKNOWN in facts["notes"] and any(_per_load(number["unit"]) for number in effect["parameters"])
+    sizes = [] if unsized else _sizes(effect["parameters"])
     listed = ", ".join(sizes) if len(sizes) <= OPTIONS.max_listed_numbers else f"{len(sizes)} numbers"
     size = f", {listed}" if sizes else ""
     meaning = f": {effect['meaning']}" if effect["meaning"] else ""
-    return f"{share} {readable(effect['name'])}{place}{size}{meaning}.{_worst(effect['worst_places'])}"
+    said = f"{share} {readable(effect['name'])}{place}{size}{meaning}.{_worst(effect['worst_places'])}"
+    return f"{said} {_NO_SIZE}" if unsized else said
+
+
+def _per_load(unit):
+    """Whether a parameter of this unit is a compliance: per newton, or per torque."""
+    return "/N" in unit or "(N" in unit
 
 
 def _worst(places):
@@ -334,7 +343,10 @@ def _sizes(parameters):
     """Fitted values with their 95 % intervals; parameters with the same value have one entry."""
     by_size = {}
     for row in parameters:
-        if np.isfinite(row["standard_error"] or np.nan):
+        # a compliance that may be zero is not found: its part has little load, or none that varies
+        least, (low, high) = OPTIONS.min_compliance_ratio * abs(row["value"]), (row["low_95"], row["high_95"])
+        found = not _per_load(row["unit"]) or low > least or high < -least
+        if found and np.isfinite(row["standard_error"] or np.nan):
             unit, factor = _READABLE.get(row["unit"], (row["unit"], 1.0))
             size = with_interval(*(factor * row[key] for key in ("value", "low_95", "high_95")), unit)
             by_size.setdefault(size, []).append(row["parameter"])

@@ -231,6 +231,13 @@ CAUSES = {
         "the temperature of use.",
         f"{_ISO_9283}, drift of pose characteristics; {_THERMAL}; Mayr et al., CIRP Annals 61, 2012",
     ),
+    "link_growth": Cause(
+        "single links grow with time towards a limit, each with a strain of its own, while the robot warms up",
+        "Measure one pose again and again from a cold start, with the temperature of each link and of its motor.",
+        "Warm the robot up before measuring and before work; keep the heat of the motor from the link, or measure at "
+        "the temperature of use.",
+        f"{_ISO_9283}, drift of pose characteristics; {_THERMAL}; Mayr et al., CIRP Annals 61, 2012",
+    ),
     "thermal_expansion": Cause(
         "all links have the length that belongs to the temperature that was measured",
         "Compare the robot's temperature at several places with the probe's; look for heat from motors, sun or doors.",

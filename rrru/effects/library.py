@@ -50,6 +50,7 @@ NAMES = _names()
 HOLDS = {
     "joint_axis_error": ("leg_asymmetry", "axis_tilt", "rail_tilt", "base_placement"),
     "friction_windup": ("backlash",),
+    "link_growth": ("thermal_growth",),
     "drive_error_function": ("encoder_eccentricity", "encoder_ovality", "transmission_error", "transmission_orders"),
     "transmission_orders": ("encoder_eccentricity", "encoder_ovality", "transmission_error"),
 }

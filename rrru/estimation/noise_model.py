@@ -28,7 +28,7 @@ import numpy.typing as npt
 from scipy.fft import dct
 from scipy.linalg import qr, toeplitz
 from scipy.optimize import minimize_scalar
-from scipy.special import expit
+from scipy.special import chdtr, expit, fdtrc
 
 from rrru.campaign.noise import along_runs
 
@@ -42,6 +42,8 @@ _STATED = 5.6
 _LEAST_AXIS = 1e-4
 # a stated noise is wrong by at most this factor: 1 sigma of its prior; beyond, it is contradicted
 CONTRADICTED = 1.3
+# a stated noise is too large where a true one would leave so small residuals with this probability; assumed
+_MAX_P_OF_STATED = 0.01
 # residual degrees of freedom after all that may be fitted, for the noise to be estimated within some 20 %
 MIN_FREE_NUMBERS = 15.0
 # free means of series, of three numbers each, for offsets between them to show: those of two series
@@ -106,6 +108,11 @@ class NoiseModel:
     def counted(self) -> Self:
         """The model under which the readings count as independent."""
         return replace(self, axis_mm=self.axis_mm * np.sqrt(self.alike), alike=1.0)
+
+    def of_size(self, noise_mm: float) -> Self:
+        """The model of another `mean_mm`, with the same discrepancy in mm."""
+        ratio = noise_mm / self.mean_mm
+        return replace(self, axis_mm=self.axis_mm * ratio, discrepancy=self.discrepancy / ratio)
 
     def whitening(
         self, series: npt.ArrayLike, discrepancy: Callable[[FloatArray], FloatArray] | None = None
@@ -182,7 +189,7 @@ def fit_noise(
     stated_mm: stated s.d. per axis, None where none is; repeats: s.d. per axis of poses that were measured several
     times and its degrees of freedom, which count where the columns leave few degrees of freedom, None for none;
     discrepancy: from half-wave numbers (m,) to variances (m,), 1 on average, of a smooth discrepancy along the series
-    that is not noise, None for none.
+    that is not noise, None for none. A stated size that is not significantly above what is found is the result's.
     """
     together, wave = along_runs(np.concatenate([columns, data[..., None]], axis=-1), series)
     length, model, instrument_mm = lengths(series), NoiseModel.white(stated_mm or 1.0), stated_mm
@@ -201,7 +208,17 @@ def fit_noise(
         new, old = ([*m.axis_mm, m.correlation, m.offset, m.discrepancy] for m in (model, last))
         if np.allclose(new, old, rtol=1e-2, atol=1e-2 * model.mean_mm):
             break
+    if stated_mm and model.mean_mm < stated_mm and not _too_large(stated_mm, model.mean_mm, seen.free):
+        return model.of_size(stated_mm)
     return model
+
+
+def _too_large(stated_mm: float, found_mm: float, freedom: float) -> bool:
+    """Whether a stated noise contradicts a smaller one that residuals of so many degrees of freedom show.
+
+    Under the stated noise f found^2 / stated^2 follows a chi-square distribution of f degrees of freedom.
+    """
+    return bool(chdtr(freedom, freedom * (found_mm / stated_mm) ** 2) < _MAX_P_OF_STATED)
 
 
 def high_frequency_noise(
@@ -217,6 +234,21 @@ def high_frequency_noise(
     left, share = _left(flat[:, -1], flat[:, :-1])
     seen = _Seen((left**2).reshape(-1, 3), share.reshape(-1, 3), wave, lengths(series))
     return seen.rough(chosen)
+
+
+def p_value(data: FloatArray, columns: FloatArray, block: FloatArray) -> float:
+    """The p value of the F test of a block (m, 3, c) in addition to columns (m, 3, k), of data (m, 3) of equal noises.
+
+    1 where the columns hold the block; see `rrru.estimation.f_test`.
+    """
+    flat = np.concatenate([columns, block], axis=-1).reshape(data.size, -1)
+    (left, share), (without, its_share) = (_left(data.ravel(), part) for part in (flat, flat[:, : columns.shape[-1]]))
+    freedom, rank = round(float(share.sum())), round(float((its_share - share).sum()))
+    if rank < 1 or freedom < 1:
+        return 1.0
+    unexplained = float(left @ left)
+    ratio = (float(without @ without) - unexplained) / rank * freedom / max(unexplained, 1e-300)
+    return float(fdtrc(rank, freedom, max(ratio, 0.0)))
 
 
 def alike(data: FloatArray, columns: FloatArray, stop: npt.NDArray[np.int_], kind: npt.NDArray[np.int_]) -> float:
@@ -345,7 +377,8 @@ class _Seen:
 
     def most_likely(self, instrument_mm: float, known: Sequence[tuple[float, float]]) -> NoiseModel:
         """The NoiseModel of the posterior mean of correlation and offset, over a grid, and the likeliest sizes."""
-        sizes = _DISCREPANCIES if self._smooth.any() else _DISCREPANCIES[:1]
+        most = self._largest_discrepancy(known)
+        sizes = _DISCREPANCIES[most >= _DISCREPANCIES]
         largest = (CONTRADICTED * instrument_mm) ** 2
         prior = np.full(len(sizes), _SOME_DISCREPANCY / max(len(sizes) - 1, 1))
         prior[0] = 1.0 - _SOME_DISCREPANCY
@@ -355,12 +388,23 @@ class _Seen:
         if best:
             found = minimize_scalar(
                 lambda octaves: -self._over_grid(2.0**octaves, largest, known).evidence,
-                bounds=np.log2(size) + np.array([-1.0, 1.0]),
+                bounds=(np.log2(size) - 1.0, min(np.log2(size) + 1.0, np.log2(most))),
                 method="bounded",
                 options={"xatol": _OCTAVES},
             )
             size = float(2.0**found.x)
         return self._mean(self._over_grid(size, largest, known), known)
+
+    def _largest_discrepancy(self, known: Sequence[tuple[float, float]]) -> float:
+        """Upper limit of the discrepancy over the noise.
+
+        Where nothing is known of the noise the readings at the highest frequencies show it, and at most half of their
+        variance may be the discrepancy's. Without a limit its white part could explain them alone, with no noise.
+        """
+        if not self._smooth.any():
+            return 0.0
+        highest = float(self._smooth[self._smooth > 0.0].min())
+        return float("inf") if known else 1.0 / np.sqrt(max(highest, 1e-12))
 
     def _over_grid(self, size: float, largest: float, known: Sequence[tuple[float, float]]) -> "_Grid":
         """Posterior of correlation and offset where the discrepancy has so many times the noise's deviation.

@@ -40,7 +40,8 @@ def gap(tables, options):
     headline is that of exactly these causes, of a group alone that one of it acts. (a) Where: measured minus
     calibrated model at the points from above and from the side, magnified as stated. (b) Why: probability of every
     effect, those of the verdict in colour, those of a group hatched. (c) Remaining gap: at points that the fit
-    has not used, under the calibrated and the corrected model, with the share closed. (d) Residual of every point.
+    has not used, under the calibrated and the corrected model, with the explained fraction of its mean square.
+    (d) Residual of every point.
     """
     campaign, frames = options["campaign"], {}
     for name in ("gap_verdicts", "gap_attribute", "gap_shrink", "gap_budget"):
@@ -125,7 +126,7 @@ def _headline(verdict, causes, words):
     name += f", {_leg(str(verdict['leg']), **words)}" if verdict["leg"] else ""
     if verdict["no_answer"]:
         return wrap(f"no cause is named: {verdict['no_answer']}", int(0.8 * _WIDE)), []
-    closed = _NOTHING.get(verdict["effects"]) or _share(verdict, " of it closed")
+    closed = _NOTHING.get(verdict["effects"]) or _share(verdict, " explained")
     # of a group alone that one of it acts, else of exactly these
     alone = causes.loc[causes["effect"] == verdict["effects"], "group_probability"].dropna()
     sure = _probability(alone.iloc[0] if len(alone) else verdict["probability"], "= ", " ")
@@ -196,7 +197,7 @@ def _causes(axes, causes, verdict, words):
 
 
 def _shrink(axes, shrink, verdict):
-    """Gap of every trajectory before and after, and the noise, with the share closed as a number."""
+    """Gap of every trajectory before and after, and the noise, with the explained fraction as a number."""
     kind = next(name for name in _KINDS if (shrink["kind"] == name).any())
     rows = shrink[shrink["kind"] == kind]
     first, last = (rows[rows["step"] == step].set_index("trajectory") for step in (0, rows["step"].max()))
@@ -210,7 +211,7 @@ def _shrink(axes, shrink, verdict):
         axes.plot(values[1], place, linestyle="none", **_AFTER)
         axes.secondary_yaxis("right").set_yticks(place, [_share(row) for _, row in last.reindex(names).iterrows()])
         above = {"transform": axes.transAxes, "ha": "left", "va": "bottom", "fontsize": 7.0, "in_layout": False}
-        axes.text(1.05, 1.035, "closed (95 %)", **above)
+        axes.text(1.05, 1.035, "explained (95 %)", **above)
     axes.set_yticks(place, ["all" if name == "*" else choose.plain(name) for name in names])
     most = 1.08 * np.nanmax([*np.concatenate(values), verdict["noise_rms_mm"]])
     axes.set(xlim=(0.0, most), ylim=(len(names) - 0.5, -0.5))
@@ -269,7 +270,7 @@ def _probability(value, equals="", space=""):
 
 
 def _share(row, words=""):
-    """Share closed with its interval in per cent; a dash where there is none."""
+    """Explained fraction with its interval in per cent; a dash where there is none."""
     shares = [row[f"share_closed{end}"] for end in ("", "_low", "_high")]
     if not np.isfinite(shares[0]):
         return "–"

@@ -57,6 +57,7 @@ def campaign_row(robot, section, measurements, singular, noise, notes, registrat
         "noise_mm": noise.mm,
         "noise_rad": noise.rad,
         "noise_from": noise.source,
+        "noise_rad_from": noise.rad_source,
         "platform_mass_kg": section.get("platform_mass_kg", np.nan),
         "registration_rms_mm": registration.rms_mm if registration else np.nan,
         "registration_max_mm": registration.max_mm if registration else np.nan,

@@ -1,12 +1,19 @@
 """The diagnosis of a six-axis arm at stops in no order: rough functions of the drives and sharp waves are separated."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from rrru.campaign import measurements as rows
 from rrru.diagnosis.diagnose import MeasuredRobot, diagnose
+from rrru.diagnosis.make_problem import make_case
+from rrru.diagnosis.result_notes import MASSES_UNKNOWN
 from rrru.diagnosis.settings import GapSettings
+from rrru.diagnosis.verdict_text import answer
 from rrru.effects import drive_error_function
 from rrru.effects.library import find
+from rrru.robots.from_dh import from_dh
 from tests.diagnosis import arms
 
 _EFFECTS = (
@@ -140,3 +147,65 @@ def test_nothing_is_named_where_nothing_acts(seed):
     assert found.verdict["effects"] == "none" and found.verdict["probability"] > 0.5
     assert "transmission_orders" not in found.inference.case.library
     assert found.verdict["gap_rms_mm"] < 0.5 * found.verdict["noise_rms_mm"]
+
+
+def _soft(robot, payload_kg, noise_mm=0.02):
+    """Diagnosis of an arm with soft joints 2 and 3, by the masses of `robot`; half of the poses carry a payload."""
+    drive, generator = arms.drives(120, np.random.default_rng(4)), np.random.default_rng(5)
+    frame = arms.commands(drive)
+    frame = frame.assign(payload_kg=np.repeat([0.0, payload_kg], 60), run=np.repeat([1, 2], 60))
+    frame = frame.assign(**rows.vector_columns("measured", rows.command(frame)))
+    springs = arms.active("drive_compliance", [0.0, 8e-9, 8e-9, 0.0, 0.0, 0.0])
+    motion = make_case(frame, arms.ARM, arms.MASSES, 1.0, {}).motion
+    twists = arms.ARM.twists_of(arms.ERRORS) + springs.contribute(motion).twists
+    position = arms.ARM.measured(arms.ARM.solve(drive, rows.command(frame), twists), twists)
+    frame = frame.assign(**rows.vector_columns("measured", position + noise_mm * generator.standard_normal((120, 3))))
+    settings = GapSettings(("drive_compliance", "encoder_eccentricity"), draws=20)
+    seen = replace(robot, parameter_set="full").reading(rows.reads(frame))
+    return diagnose(frame, MeasuredRobot(seen, arms.MASSES, noise_mm), settings)
+
+
+@pytest.mark.parametrize("payload_kg", [0.0, 5.0])
+def test_a_compliance_has_a_size_only_where_the_masses_are_stated(payload_kg):
+    """The same readings with the masses of the links and without them."""
+    stated, lacking = (_soft(robot, payload_kg) for robot in (arms.ARM, replace(arms.ARM, point_masses=())))
+    said = answer("a", stated.verdict, stated.tables)
+    (cause,) = (one for one in said["sentences"] if "is drive compliance" in one)
+    # joint 1 is upright and has no load, the others are stiff
+    assert "compliance2 = " in cause and "compliance3 = " in cause and "compliance1" not in cause
+    assert MASSES_UNKNOWN not in said["notes"]
+    said = answer("a", lacking.verdict, lacking.tables)
+    assert MASSES_UNKNOWN in said["notes"] and not any("more than stated" in note for note in said["notes"])
+    causes = [one for one in said["sentences"] if "is drive compliance" in one]
+    assert bool(causes) == (payload_kg > 0.0)
+    assert all("mrad/(N m)" not in one and "Its size is not determined" in one for one in causes)
+    untested = [note for note in said["notes"] if note.startswith("drive_compliance not tested: needs a load")]
+    assert bool(untested) == (payload_kg == 0.0)
+
+
+@pytest.mark.parametrize("grown", [(1,), (0, 1, 2, 3, 5)], ids=["one link", "all links"])
+def test_a_link_that_grows_alone_is_told_from_a_robot_that_grows(grown):
+    """Poses of robots made anew from rows of DH numbers, whose lengths grow with the time of each stop."""
+    strain, constant_s, count = 4e-4, 1200.0, 120
+    drive, time = arms.drives(count, np.random.default_rng(6)), 30.0 * np.arange(count)
+    frame = arms.commands(drive).assign(time_s=time, payload_kg=0.0)
+    position = np.empty((count, 3))
+    for k, t in enumerate(time):
+        longer = 1.0 + strain * -np.expm1(-t / constant_s)
+        lengths = [
+            {key: value * longer for key, value in row.items() if key in ("a_mm", "d_mm") and number in grown}
+            for number, row in enumerate(arms._ROWS)
+        ]
+        rows_now = [row | changed for row, changed in zip(arms._ROWS, lengths, strict=True)]
+        position[k] = from_dh(rows_now, name="six_axis", tool_mm=arms.ARM.tool_mm).forward(drive[k : k + 1])[0]
+    position += arms.NOISE_MM * np.random.default_rng(7).standard_normal(position.shape)
+    frame = frame.assign(**rows.vector_columns("measured", position))
+    settings = GapSettings(("thermal_growth", "link_growth", "base_drift", "encoder_eccentricity"), draws=20)
+    found = diagnose(frame, MeasuredRobot(arms.reading(frame), arms.MASSES, arms.NOISE_MM), settings)
+    name, parameter = ("link_growth", "strain2") if len(grown) == 1 else ("thermal_growth", "strain")
+    assert found.verdict["effects"] == name
+    numbers = found.tables["gap_parameters"].query("effect == @name").set_index("parameter")
+    assert numbers.loc[parameter, "low_95"] < strain < numbers.loc[parameter, "high_95"]
+    assert numbers.loc["time_constant", "low_95"] < constant_s < numbers.loc["time_constant", "high_95"]
+    if len(grown) == 1:
+        assert found.verdict["leg"] == 2

@@ -8,6 +8,7 @@ import pandas as pd
 import pytest
 from scipy.spatial.transform import Rotation
 
+from rrru.calibration.campaign_noise import campaign_noise
 from rrru.campaign.ingest.campaign_file import ingest
 from rrru.campaign.ingest.spec import IngestSpec
 from rrru.diagnosis.diagnose import MeasuredRobot, diagnose
@@ -15,7 +16,7 @@ from rrru.diagnosis.settings import GapSettings
 from rrru.effects.library import NAMES
 from rrru.pipeline.setup import as_measured
 from rrru.robots.hexapod import hexapod
-from tests.diagnosis import hexapod_stops
+from tests.diagnosis import arms, hexapod_stops
 
 _NOISE_MM, _NOISE_RAD, _LEAD_ERROR = 0.015, 4e-5, 1.5e-3
 _HEXAPOD = hexapod(
@@ -72,3 +73,14 @@ def test_a_constant_lead_error_is_no_growth(measured):
     found = _diagnosed(measured)
     assert found.verdict["effects"] == "lead_error" and found.verdict["leg"] == 2
     assert found.verdict["noise_rms_mm"] == pytest.approx(np.sqrt(3.0) * _NOISE_MM, rel=0.2)
+
+
+@pytest.mark.parametrize("noise_rad", [None, _NOISE_RAD])
+def test_the_sources_of_both_noises_are_said(noise_rad):
+    """Only the noise of the positions is stated, or both."""
+    frame = arms.measure(count=80)
+    found = campaign_noise(arms.reading(frame), frame, (arms.NOISE_MM, noise_rad))
+    assert (found.source, found.rad_source) == ("given", "given" if noise_rad else "high_frequency")
+    positions = frame.drop(columns=[name for name in frame if name.startswith("measured_r")])
+    found = campaign_noise(arms.reading(positions), positions, (arms.NOISE_MM, noise_rad))
+    assert found.rad_source == "" and np.isnan(found.rad)

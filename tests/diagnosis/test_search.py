@@ -4,13 +4,17 @@ force.
 
 from dataclasses import dataclass, replace
 from itertools import combinations, product
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.stats import multivariate_normal
 
 from rrru.diagnosis.calibrate import calibrate
+from rrru.diagnosis.design import advise as advise_module
 from rrru.diagnosis.design.advise import NOTHING, advise
+from rrru.diagnosis.design.expected_information import realized
 from rrru.diagnosis.design.run_limits import StatedLimits
 from rrru.diagnosis.evidence import averaged
 from rrru.diagnosis.hypothesis import Hypothesis
@@ -288,3 +292,51 @@ def test_nothing_is_advised_where_nothing_rivals():
     assert verdict.label == "frame_misregistration"
     assert advise(found, replace(verdict, rivals=()), MASSES) is NOTHING
     assert isinstance(found.state, State) and found.dropped == 0
+
+
+def test_what_a_run_adds_is_the_ratio_of_the_predictive_densities_of_its_readings(twins):
+    """Against normal densities of the readings of a run, by a dense fit of the other runs."""
+    found, verdict, _ = twins
+    names = frozenset(verdict.effects)
+    answers = found.posterior.best_of(names), found.posterior.best_of(TWINS - names)
+    case = found.case
+    added = realized(found, *answers)
+    assert set(added) == set(case.run.tolist())
+    run = case.run[-1]
+    here, logs = case.run == run, []
+    keys = [(term.effect, term.shape) for hypothesis, _ in answers for term in hypothesis.terms]
+    linear = case.linearise(found.state, keys)
+    for hypothesis, level in answers:
+        design = _columns(case.library, linear, hypothesis) / case.noise_mm
+        sd = found.evidence.scales(hypothesis.terms, hypothesis.prior_scales[level])
+        unit = np.concatenate([np.linalg.norm(design[~here][..., :7], axis=(0, 1)) ** -1.0, sd])
+        penalty = np.diag(np.concatenate([np.zeros(7), np.ones(len(sd))]))
+        old, new = ((design[rows] * unit).reshape(3 * rows.sum(), -1) for rows in (~here, here))
+        known, data = (linear.data[rows].ravel() / case.noise_mm for rows in (~here, here))
+        covariance = np.linalg.inv(old.T @ old + penalty)
+        spread_of = np.eye(len(new)) + new @ covariance @ new.T
+        logs.append(multivariate_normal(new @ covariance @ old.T @ known, spread_of).logpdf(data))
+    assert added[run] == pytest.approx(logs[0] - logs[1], abs=1e-3)
+
+
+@pytest.mark.parametrize(("added", "share"), [(0.15, 0.025), (-0.15, 0.025), (7.0, 1.0), (-7.0, 1.0)])
+def test_a_run_that_did_not_decide_is_not_advised_again(added, share, monkeypatch):
+    """Run 3 drives line_1 again; it was expected to add 6 nats: nothing alike is expected of another such run."""
+    frame = pd.DataFrame({"run": np.repeat([1, 2, 3], 10), "trajectory": np.repeat(["line_1", "line_2", "line_1"], 10)})
+    inference = SimpleNamespace(case=SimpleNamespace(measurements=frame, used=np.ones(30, dtype=bool)))
+    known = {"contest": 0, "points": 10}
+    names, gains = (
+        ("line_1 once more", "line_1 with 5 kg payload", "line_2 once more", "10 poses"),
+        (6.0, 9.0, 5.0, 8.0),
+    )
+    rows = [
+        known | {"run": name, "trajectory": name.split(" ")[0], "gain_nats": gain}
+        for name, gain in zip(names, gains, strict=True)
+    ]
+    monkeypatch.setattr(advise_module, "realized", lambda *_: {1: 0.0, 2: 0.0, 3: added})
+    seen = advise_module._realized(inference, SimpleNamespace(truth=None, imitator=None), rows, 0)
+    left = [advise_module._as_realized(row, seen)["gain_nats"] for row in rows]
+    np.testing.assert_allclose(left, [6.0 * share, 3.0 + 6.0 * share, 5.0 * share, 8.0 * share])
+    # of a run that was expected to add little nothing follows
+    few = [row | {"gain_nats": 0.1 * row["gain_nats"]} for row in rows]
+    assert advise_module._realized(inference, SimpleNamespace(truth=None, imitator=None), few, 0)[0] == 1.0

@@ -79,7 +79,7 @@ def _under(effect, coordinates, shape=None):
 def test_the_library_holds_the_robots_effects_in_their_order():
     assert tuple(EFFECTS) == _NAMES
     assert tuple(name for name in NAMES if name in EFFECTS) == _NAMES
-    others = {"drive_error_function", "transmission_orders", "read_before_rest", "thermal_expansion"}
+    others = {"drive_error_function", "transmission_orders", "read_before_rest", "thermal_expansion", "link_growth"}
     assert set(NAMES) - set(EFFECTS) - set(SLIDER_EFFECTS) == {"tool_offset", "cross_compliance"} | others
 
 

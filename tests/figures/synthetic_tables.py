@@ -153,7 +153,7 @@ def campaigns(z_down=True):
     row = {
         c.name: 1 if c.kind == "int64" else 1.0 for c in TABLES["campaigns"].columns if c.kind in ("int64", "float64")
     }
-    facts = {"robot": "made_up", "source": "made up", "noise_from": "given", "notes": ""}
+    facts = {"robot": "made_up", "source": "made up", "noise_from": "given", "noise_rad_from": "", "notes": ""}
     return check("campaigns", pd.DataFrame([row | facts | {"campaign": CAMPAIGN, "z_down": z_down}]))
 
 

@@ -136,7 +136,7 @@ def test_the_shrink_is_the_last_held_out_step_of_every_trajectory(frames):
 
 def test_the_headline_says_verdict_leg_probability_and_what_to_run_next(frames):
     bold, *rest = written(draw("gap", frames).axes[0])
-    assert bold == "link flexure + backlash, leg 2 (p = 0.97): 0.37 mm gap, 96 % of it closed (95 %: 94 to 98)"
+    assert bold == "link flexure + backlash, leg 2 (p = 0.97): 0.37 mm gap, 96 % explained (95 %: 94 to 98)"
     text = " ".join(rest)
     assert (
         "confusable with drive compliance" in text and "x \N{MINUS SIGN}512" in text and f"next: {made_up.NEXT}" in text
@@ -179,7 +179,7 @@ def test_odd_verdicts_are_drawn_too(effects, frames):
     figure = draw("gap", frames)
     bold, *rest = written(figure.axes[0])
     assert bold.startswith(f"{effects.replace('_', ' ').replace('+', ' + ')} (p > 0.99): 0.37 mm gap")
-    assert ("closed" in bold) == ("+" in effects) and ("nothing" in bold) == ("+" not in effects)
+    assert ("% explained (" in bold) == ("+" in effects) and ("nothing" in bold) == ("+" not in effects)
     assert len(rest) == 1 and "resimulated" in panel(figure, "(c)").get_xlabel() and not panel(figure, "(c)").child_axes
     assert [text.get_text() for text in panel(figure, "(d)").get_legend().get_texts()] == [
         "calibrated model",

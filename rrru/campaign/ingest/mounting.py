@@ -15,7 +15,7 @@ from rrru.campaign.ingest.frames import Frames
 from rrru.campaign.ingest.gross_advice import place_words
 from rrru.campaign.ingest.orientations import other_readings
 from rrru.campaign.ingest.sheet import MEASURED, TURNS, position_text
-from rrru.campaign.ingest.zero_offsets import LARGE, lost_zeros
+from rrru.campaign.ingest.zero_offsets import LOST, found_zeros
 from rrru.campaign.target_registration import axes_by_turning
 from rrru.kinematics.readings import Readings
 
@@ -84,7 +84,7 @@ def mounting(sheet):
     if not poses.closed.all():
         sheet.refuse_now(None, f"{int((~poses.closed).sum())} poses that the nominal robot cannot take", "known poses")
     frames, notes = _frames(sheet, named)
-    zeros = _zeros(sheet, frames, command) if driven else np.zeros(len(sheet.drives))
+    zeros, lost = _zeros(sheet, frames, command) if driven else (np.zeros(len(sheet.drives)), False)
     if not (named or zeros.any()):
         return None
     if zeros.any():
@@ -93,7 +93,7 @@ def mounting(sheet):
     left_mm = frames.framed(poses, fitted).off_mm
     if zeros.any():
         _refuse_places(sheet, left_mm)
-        notes += _in_words(sheet, zeros, left_mm)
+        notes += _in_words(sheet, zeros, left_mm) if lost else ()
     free = ~frames.known & ~frames.on_world
     if registered and free.all() and np.ptp(poses.turn, axis=0).max() < _NEVER_TURNS:
         # for a platform that never turns they are confounded with the frame's shift: their mean is set to the tool
@@ -131,13 +131,13 @@ def _frames(sheet, named):
 
 
 def _zeros(sheet, frames, command):
-    """Lost zero offsets (K,) of the drives, see `rrru.campaign.ingest.zero_offsets`."""
+    """Zero offsets (K,) of the drives and whether they are lost, see `rrru.campaign.ingest.zero_offsets`."""
     chosen = np.flatnonzero(frames.framing)
     if len(chosen) > _MAX_ROWS:
         chosen = np.sort(np.random.default_rng(0).choice(chosen, _MAX_ROWS, replace=False))
     seen = Readings(frames.seen_mm, frames.names, frames.place_mm, on_world=frames.on_world).of(chosen)
     framed = frames.select(chosen).framed
-    return lost_zeros(sheet.mechanism, (sheet.actuators(command)[chosen], command[chosen]), seen, framed)
+    return found_zeros(sheet.mechanism, (sheet.actuators(command)[chosen], command[chosen]), seen, framed)
 
 
 def _refuse_places(sheet, left_mm):
@@ -169,15 +169,14 @@ def places_instead(sheet, most_mm):
 
 
 def _in_words(sheet, zeros, left_mm):
-    """Notes on zeros (K,) of the drives that are far off, with which the nominal robot is left_mm off in the median."""
+    """Notes on lost zeros (K,) of the drives, with which the nominal robot is left_mm off in the median."""
     parts = sheet.mechanism.parts
-    shares = np.abs(zeros) / [LARGE[unit] for unit in parts.units]
+    shares = np.abs(zeros) / [LOST[unit] for unit in parts.units]
     worst = int(shares.argmax())
-    if shares[worst] < 1.0:
-        return ()
     drive = parts.drives[worst]
     most = f"{np.degrees(zeros[worst]):.3g} degrees" if drive.unit == "rad" else f"{zeros[worst]:.3g} mm"
-    count = int((shares >= 1.0).sum())
+    # none is that far off where only the start from the nominal zeros fails
+    count = max(int((shares >= 1.0).sum()), 1)
     lost = f"zeros of {count} drives are" if count > 1 else "the zero of 1 drive is"
     found = f"found with the frame, fitted by the calibration, {left_mm:.2g} mm remain in the median"
     places = places_instead(sheet, _AS_GOOD * left_mm)

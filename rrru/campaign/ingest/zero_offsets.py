@@ -20,12 +20,16 @@ from rrru.kinematics.readings import lacking
 _MAY_BE, _LOST, _EXPLAINED = 5e-4, 2e-3, 0.5
 # an assembly sets zeros better than this, in rad and in mm
 LARGE = {"rad": 5e-3, "mm": 2.0}
+# ASSUME a zero that was set by eye at marks of the axis, about a degree, is better than this: beyond, it is lost
+LOST = {"rad": np.radians(1.0), "mm": 5.0}
 # other starts, drawn so far from the nominal zeros; a fit this good needs no other
 _STARTS, _SPREAD, _ENOUGH = 16, {"rad": 0.4, "mm": 80.0}, 0.1
 # evaluations of a fit: one that ends well needs twenty
 _EVALUATIONS = 60
 # residual from which on a reading counts less
 _LOOSE_MM = 5.0
+# residual over the least, up to which two starts have ended at the same zeros
+_SAME = 1.01
 # residual of a reading whose pose does not close
 _LOST_MM = 1e4
 # share of a zero offset's effect that must be independent of frame and reflectors
@@ -33,7 +37,14 @@ _LEAST = 1e-2
 
 
 def lost_zeros(robot, driven, seen, frames):
+    """Zero offsets (K,) of the actuator values that explain the residual of the frames, see `found_zeros`."""
+    return found_zeros(robot, driven, seen, frames)[0]
+
+
+def found_zeros(robot, driven, seen, frames):
     """Zero offsets (K,) of the actuator values that explain the residual of the frames; zero where they do not.
+
+    And whether they are lost: the nominal zeros are no start that leads to them, or one is off by more than LOST.
 
     driven: actuator values (n, K) and nominal positions (n, 3); seen: Readings in the instrument's frame; frames: from
     Poses to a Framed.
@@ -41,18 +52,24 @@ def lost_zeros(robot, driven, seen, frames):
     units, nothing = robot.parts.units, np.zeros(len(robot.parts.drives))
     before = _off(robot, driven, frames, nothing)
     if before <= _MAY_BE * robot.size_mm:
-        return nothing
-    generator, best, least = np.random.default_rng(0), nothing, before
+        return nothing, False
+    generator, best, least, first_left = np.random.default_rng(0), nothing, before, np.inf
     spread = np.array([_SPREAD[unit] for unit in units])
     for start in range(_STARTS):
         first = nothing if start == 0 else spread * generator.uniform(-1.0, 1.0, len(units))
         found = _fitted(robot, driven, seen, frames, first)
         left = np.inf if found is None else _off(robot, driven, frames, found)
+        if start == 0:
+            first_left = left
         if left < least:
             best, least = found, left
         if least <= max(_ENOUGH * before, _LOST * robot.size_mm):
             break
-    return best if least < _EXPLAINED * before else nothing
+    if least >= _EXPLAINED * before:
+        return nothing, False
+    far = (np.abs(best) > [LOST[unit] for unit in units]).any()
+    # several starts end at the same zeros to rounding
+    return best, bool(far or first_left > _SAME * least)
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ from rrru.diagnosis.correction.corrected_file import corrected
 from rrru.diagnosis.correction.drive_table import corrected_drives
 from rrru.diagnosis.correction.file_error import FileModel, file_error
 from rrru.diagnosis.options import OPTIONS
+from rrru.diagnosis.result_notes import payload_notes
 from rrru.diagnosis.shrink import model_row
 from rrru.diagnosis.verdict_text import NOT_CORRECTED, readable
 from rrru.errors import ConfigError, SimulationError, UnreachableError
@@ -47,7 +48,9 @@ def write_corrected(diagnosis, section, masses, file, seed=0):
         worth = {
             "file_error_mm": error.measured_mm,
             "file_error_fresh_mm": error.fresh_mm,
-            "file_remainder": _remainder(shrink, more, written, error, inference.case),
+            "file_remainder": _remainder(
+                shrink, more, (written, tuple(payload_notes(inference))), error, inference.case
+            ),
             "file_headline": _headline(written, error),
         }
         shrink, lost = pd.concat([shrink, more], ignore_index=True), written.not_in_model
@@ -79,11 +82,13 @@ def _refuse_worse(more):
 def _remainder(shrink, more, written, error, case):
     """Residual error of a corrected file beyond that of the diagnosis, in words, empty where negligible.
 
-    written: the Corrected file; error: its FileError; case: the DiagnosisProblem, whose readings it holds for.
+    written: the Corrected file, and sentences on payload and tilt, which no file holds; error: its FileError; case: the
+    DiagnosisProblem, whose readings it holds for.
     """
+    written, of_weight = written
     left, whole = _left_mm(more, "corrected_model"), _left_mm(shrink, "held_out")
-    if written.lacking:
-        names = ", ".join(map(readable, written.lacking))
+    if written.lacking or of_weight:
+        names = ", ".join([*map(readable, written.lacking), *(f"that {note}" for note in of_weight)])
         known = [size for size in (error.measured_mm, error.fresh_mm) if np.isfinite(size)]
         size = f": {max(known):.2g} mm rms remain {_conditions(case)}" if known else ""
         return f"this {_holds(written)} and not {names}{size}; use corrected_drives"

@@ -2,7 +2,9 @@
 
 Candidates are further passes along a campaign's own trajectories. Where none of them would decide between the first two
 answers, poses are chosen too, each the one that adds most to those before it. What they add is counted as
-`rrru.diagnosis.design.expected_information` says. No candidate exceeds the limits of the robot, see
+`rrru.diagnosis.design.expected_information` says. Where a trajectory was driven again before, and that was expected to
+decide, the readings show which share f of the expected gain was realized. What needs no other payload or speed is then
+worth f times as much. No candidate exceeds the limits of the robot, see
 `rrru.diagnosis.design.run_limits`.
 """
 
@@ -15,7 +17,7 @@ import pandas as pd
 from rrru.campaign import measurements as rows
 from rrru.diagnosis.design import poses
 from rrru.diagnosis.design.contests import contests_of
-from rrru.diagnosis.design.expected_information import greedy, worth
+from rrru.diagnosis.design.expected_information import greedy, realized, worth
 from rrru.diagnosis.design.run_limits import RunLimits, StatedLimits, run_limits
 from rrru.diagnosis.make_problem import make_case
 from rrru.diagnosis.options import OPTIONS
@@ -24,6 +26,8 @@ RUN = ("run", "kind", "trajectory", "reverse", "speed_mm_s", "payload_kg", "poin
 _COLUMNS = (*RUN, "separates", "now_nats", "gain_nats")
 _POSE = ("pose", *(f"{end}_{axis}_mm" for end in ("from", "to") for axis in "xyz"))
 _POSE += (*(f"command_r{axis}_rad" for axis in "xyz"), "speed_mm_s", "payload_kg")
+# words for a pass that repeats one that was driven
+_AGAIN = "once more"
 # kinds of further passes: in reverse, fast, loaded
 _KINDS = ((False, False, False), (True, False, False), (False, True, False), (False, False, True), (True, True, True))
 
@@ -57,9 +61,12 @@ def advise(inference, verdict, masses, stated=None, sizes=None):
     stated = stated or StatedLimits()
     limits, limited = run_limits(inference.case, masses, stated)
     result = _runs(inference, contests, masses, limits)
+    seen = [_realized(inference, contest, result, number) for number, contest in enumerate(contests)]
+    result = [_as_realized(row, seen[row["contest"]]) for row in result]
     first, listed = [row for row in result if row["contest"] == 0], NOTHING.poses
     if not any(row["gain_nats"] > OPTIONS.decisive_gain_nats for row in first):
         row, listed = _poses(inference, contests[0], masses, limits)
+        row = [_as_realized(one, seen[0]) for one in row]
         result, first = result + row, first + row
     runs = pd.DataFrame(result, columns=["contest", *_COLUMNS])
     runs = runs[runs["gain_nats"] > OPTIONS.min_run_gain_nats]
@@ -91,6 +98,38 @@ def _runs(inference, contests, masses, limits):
             about = {"contest": number, "separates": contest.separates, "now_nats": start}
             result.append(run | about | {"gain_nats": (now + one).nats() - start})
     return result
+
+
+def _realized(inference, contest, rows, number):
+    """Share of the expected gain that the last run along a trajectory driven before has added, at most 1.
+
+    1 where it was not expected to decide. And the expected gain of a plain repetition by trajectory; number: of the
+    Contest among rows of `_runs`.
+    """
+    again = [row for row in rows if row["contest"] == number and row["run"] == f"{row['trajectory']} {_AGAIN}"]
+    expected = {row["trajectory"]: row["gain_nats"] for row in again}
+    frame = inference.case.measurements[inference.case.used]
+    driven = frame.groupby("run", sort=False)["trajectory"].first().astype(str)
+    repeated = driven[driven.duplicated() & driven.isin(expected)]
+    if repeated.empty:
+        return 1.0, expected
+    run, trajectory = repeated.index[-1], repeated.iloc[-1]
+    count = next(row["points"] for row in again if row["trajectory"] == trajectory)
+    whole = expected[trajectory] * float((frame["run"] == run).sum()) / count
+    if not whole > OPTIONS.decisive_gain_nats:
+        return 1.0, expected
+    # evidence for either answer counts
+    found = abs(realized(inference, contest.truth, contest.imitator).get(run, np.inf))
+    return float(min(found / whole, 1.0)), expected
+
+
+def _as_realized(row, seen):
+    """A row of `gap_next_runs` whose gain without another payload or speed is multiplied by `_realized`'s share."""
+    share, expected = seen
+    plain = expected.get(row["trajectory"], max(expected.values(), default=0.0))
+    if row["run"].endswith(" poses"):
+        plain = row["gain_nats"]
+    return row | {"gain_nats": row["gain_nats"] - (1.0 - share) * min(row["gain_nats"], max(plain, 0.0))}
 
 
 def _planned(case, table, masses):
@@ -189,7 +228,7 @@ def candidates(frame, limits=None):
                 continue
             tables.append(table)
             how = ["in reverse"] * reverse + _how(fast, loaded, speed, load)
-            words = f"{name} {' '.join(how) or 'once more'}"
+            words = f"{name} {' '.join(how) or _AGAIN}"
             result.append(dict(zip(RUN, (words, "run", str(name), reverse, speed, load, len(first)), strict=True)))
     return result, pd.concat(tables, ignore_index=True) if tables else frame.iloc[:0]
 

@@ -10,6 +10,7 @@ nats. Further points add to the sums of squares and products that I is made of; 
 from dataclasses import dataclass, replace
 
 import numpy as np
+import pandas as pd
 
 from rrru.diagnosis.state import State
 from rrru.diagnosis.terms import signatures, spread
@@ -26,6 +27,9 @@ class Sums:
     def __add__(self, other):
         return Sums(self.precision + other.precision, self.moment + other.moment, self.square + other.square)
 
+    def __sub__(self, other):
+        return Sums(self.precision - other.precision, self.moment - other.moment, self.square - other.square)
+
     @classmethod
     def of(cls, design, data, noise_mm):
         """The Sums of a design (n, 3, k) and data (n, 3) under a noise per axis."""
@@ -38,6 +42,12 @@ class Sums:
         scaled = unit[:, None] * self.precision * unit + 1e-12 * np.eye(len(unit))
         moment = unit * self.moment
         return float(0.5 * (self.square - moment @ np.linalg.solve(scaled, moment)))
+
+    def cost(self):
+        """Minus the log marginal likelihood up to a constant: `nats` and half of the log determinant."""
+        unit = 1.0 / np.sqrt(np.maximum(np.diag(self.precision), 1e-300))
+        scaled = unit[:, None] * self.precision * unit + 1e-12 * np.eye(len(unit))
+        return self.nats() + 0.5 * float(np.linalg.slogdet(scaled)[1] - 2.0 * np.log(unit).sum())
 
 
 def worth(inference, truth, rival, planned):
@@ -65,6 +75,29 @@ def worth(inference, truth, rival, planned):
     now = Sums.of(designs[0], made[0], case.noise_mm) + Sums(np.diag(penalty), np.zeros(len(penalty)), 0.0)
     runs = [planned.run == number for number in np.unique(planned.measurements["run"])]
     return now, [Sums.of(designs[1][run], made[1][run], case.noise_mm) for run in runs]
+
+
+def realized(inference, truth, rival):
+    """By run of the campaign the log Bayes factor between two answers that its readings added to those of all others.
+
+    log p(d_r | others, A) - log p(d_r | others, B) in nats, of the linearisation, by number of run; empty for one run.
+    """
+    case = reachable(replace(inference.case, nuisance_sd={}), inference.state)
+    answers = [(hypothesis.terms, hypothesis.prior_scales[level]) for hypothesis, level in (truth, rival)]
+    keys = list(dict.fromkeys((term.effect, term.shape) for terms, _ in answers for term in terms))
+    linear = case.linearise(inference.state, keys)
+    base = np.concatenate([linear.base, *linear.shape_columns.values()], axis=-1)
+    runs = {number: case.run == number for number in pd.unique(case.run)}
+    result = dict.fromkeys(runs, 0.0) if len(runs) > 1 else {}
+    for sign, (terms, scales) in zip((1.0, -1.0), answers, strict=True):
+        design = np.concatenate([base, *signatures(case.library, linear, terms)], axis=-1)
+        penalty = np.zeros(design.shape[-1])
+        penalty[base.shape[-1] :] = inference.evidence.scales(terms, scales) ** -2.0
+        parts = {number: Sums.of(design[rows], linear.data[rows], case.noise_mm) for number, rows in runs.items()}
+        whole = sum(parts.values(), Sums(np.diag(penalty), np.zeros(len(penalty)), 0.0))
+        for number in result:
+            result[number] += sign * ((whole - parts[number]).cost() - whole.cost())
+    return result
 
 
 def reachable(case, state):

@@ -122,4 +122,4 @@ def true_share(robot, about, mechanism, calibrated, corrected):
     # an effect that depends on the direction of approach predicts nothing where that direction is unknown
     known = case.complete({name for name, _ in state.effects} & case.known.keys())
     before, after = case.residual(State(calibrated, {}))[known], case.residual(state)[known]
-    return float(1.0 - np.sqrt((after**2).sum() / (before**2).sum()))
+    return float(1.0 - (after**2).sum() / (before**2).sum())

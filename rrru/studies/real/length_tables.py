@@ -132,8 +132,8 @@ def share_closed(before, after, noise_mm):
 
     def share(chosen):
         total = np.maximum(counts[chosen].sum(axis=-1), 1)
-        gaps = [np.sqrt(np.maximum(one[chosen].sum(axis=-1) / total - noise_mm**2, 0.0)) for one in (first, second)]
-        return np.where(gaps[0] > 0.0, np.maximum(1.0 - gaps[1] / np.maximum(gaps[0], 1e-12), -1.0), 0.0)
+        gaps = [np.maximum(one[chosen].sum(axis=-1) / total - noise_mm**2, 0.0) for one in (first, second)]
+        return np.where(gaps[0] > 0.0, np.maximum(1.0 - gaps[1] / np.maximum(gaps[0], 1e-24), -1.0), 0.0)
 
     value = float(share(np.arange(len(counts))))
     low, high = np.quantile(share(drawn), [0.025, 0.975])

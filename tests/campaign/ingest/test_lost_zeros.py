@@ -124,6 +124,24 @@ def test_lost_lengths_of_hexapods_are_found_with_frame_and_reflectors(seed, tmp_
     assert [note.partition(":")[0] for note in zero_notes(sure, robot)] == [note.partition(":")[0] for note in noted]
 
 
+@pytest.mark.parametrize("degrees", [0.3, 0.7, 3.0])
+def test_a_zero_is_lost_only_where_it_is_off_by_more_than_marks_are_read(degrees, tmp_path):
+    """One zero of an arm; a smaller one is a number of the calibration like any other."""
+    generator = np.random.default_rng(5)
+    zeros = np.zeros(6)
+    zeros[2] = np.radians(degrees)
+    made = _arm(generator)
+    found = _file(tmp_path, made, generator, zeros)
+    (noted,) = [note for note in found.notes if "lost" in note] or [""]
+    assert noted.startswith(
+        f"the zero of 1 drive is lost, by {degrees:.0f} degrees at joint 3" if degrees > 1.0 else ""
+    )
+    assert bool(noted) == (degrees > 1.0)
+    fit, _ = _calibrated(found, made[0])
+    values = dict(zip(fit.parameters.names, fit.deviations.tolist(), strict=True))
+    assert values["dq3"] == pytest.approx(zeros[2], abs=2e-3)
+
+
 def test_zeros_that_are_known_are_left_alone(tmp_path):
     generator = np.random.default_rng(5)
     made = _arm(generator)

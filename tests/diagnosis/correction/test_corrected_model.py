@@ -341,3 +341,16 @@ def test_errors_of_numbers_that_are_fitted_without_effects_hold_what_is_left(arm
     for site, steps in stated.items():
         np.testing.assert_allclose(errors[site], errors[site].max() / steps.max() * steps, rtol=1e-9)
         assert errors[site].max() / steps.max() == pytest.approx(ratio, rel=0.3)
+
+
+def test_a_tilt_that_no_file_holds_is_said_with_what_remains(attached, tmp_path, monkeypatch):
+    """A base that is not level, with a compliance that the file holds: nothing else is lacking."""
+    found, *_, section = attached
+    tilt = "the base is tilted by 1.7 degrees (95 %: 1.4 to 2.0) about x, the configuration assumes 0"
+    monkeypatch.setattr(corrected_model, "payload_notes", lambda _: [tilt])
+    again = write_corrected(found, section, _MASSES, tmp_path / "corrected.xml").verdict
+    left = max(again["file_error_mm"], again["file_error_fresh_mm"])
+    assert again["file_remainder"] == (
+        f"this MJCF holds geometry, compliance and backlash of the drives and not that {tilt}: "
+        f"{left:.2g} mm rms remain; use corrected_drives"
+    )

@@ -314,7 +314,7 @@ def test_what_commands_and_payloads_mean_and_the_noise_of_orientations_are_named
         frame = frame.assign(**rows.turn_columns("measured", poses.turn))
     frame.to_csv(tmp_path / "stops.csv", index=False)
     (tmp_path / "own.yaml").write_text(yaml.safe_dump({"robots": {"own": robot}}))
-    main([str(tmp_path / "stops.csv"), "--robot", "own", "--configfile", str(tmp_path / "own.yaml")])
+    main([str(tmp_path / "stops.csv"), "--robot", "own", "--config", str(tmp_path / "own.yaml")])
     text = capsys.readouterr().out
     assert "whatever target a row is of" in text and "computed from the drive values" in text
     assert "payload_kg, where you add it, hangs at the tool, (0, 0, 0) mm" in text

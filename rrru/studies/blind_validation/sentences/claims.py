@@ -88,6 +88,7 @@ _NOTES = {
     "the noise is smaller": rf"noise stated {_X} mm per axis, found {_Y}: the instrument is better",
     "a noise of zero was stated": rf"noise_mm is 0, which no instrument reaches: the noise is estimated, {_X} mm .*",
     "repeatability is unknown": r"repeatability is unknown: no pose was measured twice",
+    "masses are unknown": r"no masses of the links are stated: .*",
     "an effect needs what is not there": r"(?P<name>\w+) not tested: needs (?P<needs>[\w, ]+), which the columns .*",
     "an effect needs different values": r"(?P<name>\w+) not tested: needs (?P<needs>[\w, ]+) of more than one value",
     "an effect is a calibration's number": r"(?P<name>\w+) not tested: the calibration's own parameters absorb it",

@@ -299,7 +299,7 @@ def _holds(ends, true, digit=0.0):
 
 def _closed(stated, truth, _facts):
     """Interval of the fraction of the gap at fresh stops that the verdict's effects explain."""
-    return _holds(stated["ends"], 1.0 - truth.after_mm / truth.before_mm, _PRINTED) if truth.before_mm else None
+    return _holds(stated["ends"], 1.0 - (truth.after_mm / truth.before_mm) ** 2, _PRINTED) if truth.before_mm else None
 
 
 def _budget(stated, truth, _facts):
@@ -474,6 +474,7 @@ _JUDGES = {
     "an effect needs different values": _needs_different,
     "an effect is a calibration's number": lambda stated, t, _: stated["name"] not in t.effects,
     "an effect is absorbed": _absorbed,
+    "masses are unknown": _undecided,
     "an effect is not tested": _undecided,
     "runs are limited": _undecided,
     "the file leaves": _file_leaves,

@@ -1,0 +1,54 @@
+"""Link growth: single links of an arm grow with time towards a limit, as where the heat of one motor warms its link.
+
+As in `thermal_growth`, but with a final strain e_k of its own for all lengths l that drive k moves and drive k + 1 does
+not:
+
+    dl(t) = l e_k (1 - exp(-t / tau))
+
+One time constant tau holds for all links. The column below the first drive is no link: its growth moves the whole robot
+as a drift of the base does.
+
+Assumptions: each link has one temperature; constant power over the campaign.
+
+Source: as `thermal_growth`; Mayr et al., Thermal issues in machine tools, CIRP Annals 61, 2012 (heat of single drives).
+"""
+
+import numpy as np
+
+from rrru.effects.protocol import Contribution, Effect, plain_coordinates
+from rrru.effects.thermal_growth import SHAPES, TIME_CONSTANT, lengths, warmth
+from rrru.parameters import Parameter, ParameterSet
+
+_TYPICAL, _MOST, _SOURCE = 2e-4, 1e-2, "aluminium 2.3e-5 per kelvin; temperature assumed"
+
+
+def for_robot(robot):
+    """The effect model for an arm with two links or more that each follow a drive of their own, None for others."""
+    legs = robot.legs
+    if len(legs.legs) != 1 or not legs.arm_joints or legs.coupling is not None:
+        return None
+    links = _links(legs)
+    if len(links) < 2:
+        return None
+    parameters = ParameterSet(
+        (*(Parameter(f"strain{k}", "1", 0.0, 0.0, _MOST, _SOURCE, k) for k in links), TIME_CONSTANT)
+    )
+
+    def grown(motion, values):
+        """Shifts of the links' ends by their growth under the strains and the time constant in s."""
+        *strains, time_constant = values
+        longer = sum(strain * links[k] for k, strain in zip(links, strains, strict=True))
+        return Contribution(np.multiply.outer(warmth(motion, time_constant), longer))
+
+    return Effect("link_growth", parameters, plain_coordinates(parameters, _TYPICAL, SHAPES), grown, ("time_s",))
+
+
+def _links(legs):
+    """Twists (sites, 6) that make all lengths of a link longer by their own size, by number of the drive from 1 on."""
+    (leg,), every, result, drive = legs.legs, lengths(legs), {}, None
+    for joint in leg.joints:
+        site = legs.site_numbers[joint.name]
+        if drive is not None and every[site].any():
+            result.setdefault(drive + 1, np.zeros_like(every))[site] = every[site]
+        drive = joint.drive if joint.drive is not None else drive
+    return result
