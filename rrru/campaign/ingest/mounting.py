@@ -25,6 +25,9 @@ _UNNAMED = "tool"
 _NEVER_TURNS = 1e-6
 # places explain the same residual as zero offsets of the drives where they leave at most so many times as much
 _AS_GOOD, _FAR_BETTER = 2.0, 0.5
+# share of the robot's size from which a place is grossly wrong; less may be an error of the base or the platform, which
+# the calibration fits
+_GROSS_SHARE = 0.01
 # cosine from which on an axis is one of the body's
 _ALONG = 0.9999
 # rows from which lost zero offsets are estimated; the calibration fits the result to all of them
@@ -92,7 +95,7 @@ def mounting(sheet):
     rotation, place = fitted = frames.fitted(poses)
     left_mm = frames.framed(poses, fitted).off_mm
     if zeros.any():
-        _refuse_places(sheet, left_mm)
+        _refuse_places(sheet, left_mm, lost)
         notes += _in_words(sheet, zeros, left_mm) if lost else ()
     free = ~frames.known & ~frames.on_world
     if registered and free.all() and np.ptp(poses.turn, axis=0).max() < _NEVER_TURNS:
@@ -140,12 +143,25 @@ def _zeros(sheet, frames, command):
     return found_zeros(sheet.mechanism, (sheet.actuators(command)[chosen], command[chosen]), seen, framed)
 
 
-def _refuse_places(sheet, left_mm):
-    """Raise IngestError where other places leave far less than the left_mm of lost zeros."""
-    if places := places_instead(sheet, _FAR_BETTER * left_mm):
-        value = f"measured positions that lost zeros of the drives bring to {left_mm:.3g} mm from the nominal robot"
-        allowed = f"at most {_FAR_BETTER * left_mm:.2g} mm; {places} brings them there, frame: register may do so, too"
-        sheet.refuse_now(MEASURED, value, allowed)
+def _refuse_places(sheet, left_mm, lost):
+    """Raise IngestError where other places leave far less than the left_mm of zeros of the drives.
+
+    lost: whether these are lost; smaller ones are refused only where the other places are far from the stated ones.
+    """
+    places = _places(sheet, _FAR_BETTER * left_mm)
+    if not places or not (lost or _moved_mm(sheet, places) > _GROSS_SHARE * sheet.mechanism.size_mm):
+        return
+    value = f"measured positions that other zeros of the drives bring to {left_mm:.3g} mm from the nominal robot"
+    allowed = f"at most {_FAR_BETTER * left_mm:.2g} mm; {place_words(places)} brings them there, "
+    sheet.refuse_now(MEASURED, value, f"{allowed}frame: register may do so, too")
+
+
+def _moved_mm(sheet, places):
+    """Largest distance in mm of places by name from the stated ones, infinite where one is not stated."""
+    stated = {"": sheet.mechanism.tool_mm, **sheet.spec.targets}
+    if not set(places) <= set(stated):
+        return np.inf
+    return max(float(np.linalg.norm(place - np.asarray(stated[name]))) for name, place in places.items())
 
 
 def places_instead(sheet, most_mm):
@@ -153,19 +169,26 @@ def places_instead(sheet, most_mm):
 
     In words; empty where a median distance of more than most_mm remains.
     """
+    places = _places(sheet, most_mm)
+    return place_words(places) if places else ""
+
+
+def _places(sheet, most_mm):
+    """Places (3,) by name of the targets, "" for the tool, as for `places_instead`; none where more remains."""
     frame, poses = sheet.frame, sheet.poses
     if sheet.spec.frame != "robot":
-        return ""
+        return {}
     seen, names = rows.measured(frame), np.full(len(frame), "")
     if "target" in frame:
         names = frame["target"].astype(str).to_numpy()
     open_places, right = np.full(seen.shape, np.nan), np.isfinite(seen).all(axis=1) & poses.closed
     frames = Frames(seen, names, open_places, np.isin(names, sheet.spec.world_targets), right, registered=False)
     if not frames.framing.any():
-        return ""
+        return {}
     found, names = frames.framed(poses), names[frames.framing]
-    places = {name: found.place_mm[names == name][0] for name in dict.fromkeys(names.tolist())}
-    return place_words(places) if found.off_mm <= most_mm else ""
+    if found.off_mm > most_mm:
+        return {}
+    return {name: found.place_mm[names == name][0] for name in dict.fromkeys(names.tolist())}
 
 
 def _in_words(sheet, zeros, left_mm):

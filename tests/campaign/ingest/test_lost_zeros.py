@@ -14,6 +14,7 @@ from rrru.campaign.ingest.campaign_file import IngestSpec, ingest
 from rrru.diagnosis.result_notes import zero_notes
 from rrru.robots.hexapod import hexapod
 from rrru.robots.serial import serial
+from rrru.studies.blind_validation.sentences.mistakes import read, right_file
 from tests.schemas import check_measurements
 
 _NOISE_MM = 0.02
@@ -149,3 +150,11 @@ def test_zeros_that_are_known_are_left_alone(tmp_path):
     assert not any("lost" in note for note in found.notes)
     fit, robot = _calibrated(found, made[0])
     assert not list(zero_notes(fit.estimate, robot))
+
+
+@pytest.mark.parametrize("number", [18, 178, 198, 558, 777, 838])
+def test_a_base_that_is_off_by_some_mm_is_no_wrong_place_of_a_target(number, tmp_path):
+    """Deltas of another simulator: the platform never turns, so that a shift of the base is one of all targets."""
+    own, handed = right_file(number, 902417, 300)
+    assert own.name.startswith("delta")
+    assert read(own, handed, tmp_path)[0] == "accepted"
