@@ -9,6 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from rrru.campaign.ingest.formats import read_cells
+from rrru.campaign.ingest.guess import names_trajectories
 from rrru.campaign.ingest.problems import Problems
 
 _ONE = "all"
@@ -17,7 +18,7 @@ _ONE = "all"
 def with_commands(spec, measured, problems):
     """The Cells of a file with the columns of `spec.commands` in addition to its own.
 
-    A tracker's list without names of trajectories is one trajectory. Raises IngestError where the files do not belong
+    A file without names of trajectories is one trajectory. Raises IngestError where the files do not belong
     together.
     """
     if spec.commands is not None:
@@ -26,7 +27,8 @@ def with_commands(spec, measured, problems):
         problems_of_commands.refuse()
         measured = _joined(spec, measured, commanded, problems)
     name = spec.columns.get("trajectory", measured.means.get("trajectory", "trajectory"))
-    if measured.means and name not in measured.names and "trajectory" not in spec.columns:
+    absent = name not in measured.names and "trajectory" not in spec.columns
+    if absent and (measured.means or not names_trajectories(measured.names)):
         notes = (*measured.notes, f"no column trajectory: all points count as one, {_ONE}")
         cells = {**measured.cells, "trajectory": [_ONE] * len(measured.rows)}
         return replace(measured, names=[*measured.names, "trajectory"], cells=cells, notes=notes)

@@ -2,7 +2,7 @@
 
 import re
 from datetime import datetime
-from difflib import SequenceMatcher
+from difflib import SequenceMatcher, get_close_matches
 
 from rrru.campaign.ingest.cells import decode, separator_of
 from rrru.campaign.ingest.clock import is_clock
@@ -54,6 +54,12 @@ _CLOCKS = (
 _LENGTH_UNITS = {factor: unit for unit, factor in MM.items()}
 _ANGLE_UNITS = {"rad": "rad", "deg": "deg", "degree": "deg", "degrees": "deg", "°": "deg"}
 _LAST = re.compile(r"[_ ]([a-z°]+)$")
+
+
+def names_trajectories(names):
+    """Whether one of a file's columns may hold the names of trajectories, under whatever heading."""
+    words = [re.sub(r"[\W_]+", " ", name.casefold()).strip() for name in names]
+    return any(word in _NAMED["trajectory"] or get_close_matches(word, ["trajectory"], cutoff=0.7) for word in words)
 
 
 def guess_format(path, problems):

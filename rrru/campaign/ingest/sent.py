@@ -16,6 +16,7 @@ def sent_to(frame, mechanism, problems):
     """
     drives = [*mechanism.parts.columns]
     check_end_effectors(frame, mechanism, problems)
+    problems.refuse()
     values = frame[drives].to_numpy(dtype=float)
     position = mechanism.forward(values, guess_mm=mechanism.guess(values, frame.get("target")))
     # blank drive values are a problem of their own
@@ -32,18 +33,20 @@ def check_end_effectors(frame, mechanism, problems):
     A pose belongs to the end effector nearest to the commanded position, so that this has to be the named one's.
     """
     carried = [target for targets in mechanism.legs.hands for target in targets]
-    if carried and "target" not in frame:
+    if not carried:
+        return
+    if "target" not in frame:
         problems.add("missing column", column="target", value="no such column", allowed=", ".join(carried))
     if carried and "target" in frame:
         for i in np.flatnonzero(~frame["target"].isin(carried)):
             value, allowed = frame["target"].iloc[i], f"a target on an end effector: {', '.join(carried)}"
             problems.add("reflectors", row=frame.index[i], column="target", value=value, allowed=allowed)
     drives = [*mechanism.parts.columns]
-    if carried and not set(drives) <= set(frame):
+    if not set(drives) <= set(frame):
         allowed = "a column for each drive: commanded positions do not determine those of several end effectors"
         problems.add("missing column", column=", ".join(drives), value="no such columns", allowed=allowed)
     problems.refuse()
-    if carried and set(COMMAND) <= set(frame):
+    if set(COMMAND) <= set(frame):
         values, command = frame[drives].to_numpy(dtype=float), frame[[*COMMAND]].to_numpy(dtype=float)
         stated, nearest = mechanism.guess(values, frame["target"]), mechanism.forward(values, guess_mm=command)
         for i in np.flatnonzero(np.linalg.norm(stated - nearest, axis=1) > _SAME_MM):
