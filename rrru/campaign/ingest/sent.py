@@ -37,7 +37,7 @@ def check_end_effectors(frame, mechanism, problems):
         return
     if "target" not in frame:
         problems.add("missing column", column="target", value="no such column", allowed=", ".join(carried))
-    if carried and "target" in frame:
+    if "target" in frame:
         for i in np.flatnonzero(~frame["target"].isin(carried)):
             value, allowed = frame["target"].iloc[i], f"a target on an end effector: {', '.join(carried)}"
             problems.add("reflectors", row=frame.index[i], column="target", value=value, allowed=allowed)
