@@ -334,8 +334,8 @@ def load_robot(
     >>> load_robot({"dh": [{"a_mm": 300.0, **whole_turn}, {"a_mm": 200.0, **whole_turn}]}, name="planar").drives
     ('q1_rad', 'q2_rad')
     """
-    stated = {"tip": tip, "base": base, "tips": tips, "carries": carries, "home": home, "platform": platform}
-    stated |= {"tool_mm": tool_mm, "limits": limits}
+    stated: dict[str, Any] = {"tip": tip, "base": base, "tips": tips, "carries": carries, "home": home}
+    stated |= {"platform": platform, "tool_mm": tool_mm, "limits": limits}
     given = {key: _plain(value) for key, value in stated.items() if value is not None}
     name, entry = _entry(source, name)
     entry = merged(entry, given)
@@ -419,7 +419,7 @@ def configured_campaign(name: str, config: Mapping[str, Any] | str | Path) -> Ca
     section = parts.entry(whole, "campaigns", name, "campaign")
     if "ingest" not in section:
         raise ConfigError(f"campaign {name} is a virtual one; allowed: a measured one, or run it by snakemake")
-    parts.check_files(whole | {"campaigns": {name: section}})
+    parts.check_files({**whole, "campaigns": {name: section}})
     robot = RobotModel(section["robot"], whole["robots"][section["robot"]])
     return Campaign(name, robot, whole, read_job.read(parts.read_settings(whole, name)))
 
@@ -494,6 +494,8 @@ def _entry(source: str | Path | Mapping[str, Any], name: str | None) -> tuple[st
         return name or "robot", _plain(source)
     known, path = read_config()["robots"], Path(source)
     if str(source) in known:
+        if name not in (None, str(source)):
+            raise ConfigError(f"robot {source}: name is {name!r}; allowed: its own, robots of the package keep theirs")
         return str(source), known[str(source)]
     if not path.is_file():
         allowed = f"a URDF, MJCF or YAML file, or {', '.join(known)}"
@@ -501,7 +503,7 @@ def _entry(source: str | Path | Mapping[str, Any], name: str | None) -> tuple[st
     if path.suffix.lower() in (".yaml", ".yml"):
         described = {key: one for key, one in read_config([path])["robots"].items() if key not in known or key == name}
         chosen = name or (next(iter(described)) if len(described) == 1 else None)
-        if chosen not in described:
+        if chosen is None or chosen not in described:
             raise ConfigError(f"{path}: robots has no {chosen!r}; allowed: name as one of {', '.join(described)}")
         return chosen, described[chosen]
     return name or as_name(path.stem), {_kind(path): str(path)}

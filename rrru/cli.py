@@ -270,7 +270,7 @@ def _effects(options: argparse.Namespace) -> int:
     from rrru.robots.drive_words import drive_words
 
     config, name = _with_robot(options, read_config(options.config))
-    robot = RobotModel(name, config["robots"][name]).mechanism
+    robot = RobotModel(str(name), config["robots"][name]).mechanism
     words = drive_words(robot)
     for effect in library(robot):
         print(_wrapped(f"{effect}: {cause_texts(effect, words).meaning}"))

@@ -69,6 +69,11 @@ def test_the_defaults_of_the_package_are_those_of_the_studies():
         assert stated == section, name
 
 
+def test_the_example_of_a_real_robot_is_the_robot_of_the_study():
+    study, own = (yaml.safe_load((ROOT / name).read_text()) for name in ("config.yaml", "examples/ur10.yaml"))
+    assert own["robots"]["ur10"] == study["robots"]["ur10"]
+
+
 def test_a_data_frame_is_read_as_its_file_is(monkeypatch):
     monkeypatch.chdir(ROOT)
     robot = rrru.load_robot("rrru3")

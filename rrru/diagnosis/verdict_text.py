@@ -24,7 +24,7 @@ _APART = ("none", "unexplained")
 _OUTSIDE = {"none": "that nothing acts", "unexplained": "something that the library does not hold"}
 _CHECK = (
     "Next: check units, signs and order of the drives, frame and places of targets, and whether the file is of this "
-    "robot: make check-data FILE=... names what reconciles them."
+    "robot: `rrru check` names what reconciles them."
 )
 # first words of the column not_in_model where no file was written
 NOT_CORRECTED = "not corrected: "

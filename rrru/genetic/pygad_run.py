@@ -10,9 +10,8 @@ generations as the migration interval: PyGAD continues where it stopped when it 
 import logging
 
 import numpy as np
-import pygad
 
-from rrru.errors import FitError
+from rrru.errors import ConfigError, FitError
 from rrru.genetic import operators
 from rrru.genetic.islands import migrate
 from rrru.genetic.plan import make_plan, migrants_of
@@ -27,7 +26,8 @@ _LOGGER.propagate = False
 def run(objective, box, settings, seed):
     """GeneticResult of an objective, see `algorithm.minimise`, within a Box.
 
-    Stalled is PyGAD's "saturate": the best objective stayed the same. Raises FitError where no individual is feasible.
+    Stalled is PyGAD's "saturate": the best objective stayed the same. Raises FitError where no individual is feasible,
+    and ConfigError where PyGAD is not installed.
     """
     islands = [_Island(objective, box, settings, size, seed + k) for k, size in enumerate(settings.populations)]
     stall, rows = settings.stall_generations, make_plan(settings.populations, settings.elite_share, 1.0)
@@ -49,6 +49,16 @@ def run(objective, box, settings, seed):
     return result
 
 
+def _pygad():
+    """The library, which only this reading of the paper needs."""
+    try:
+        import pygad
+    except ImportError as error:
+        allowed = "another entry of genetic.operators, or pip install 'rrru[genetic]'"
+        raise ConfigError(f"genetic.operators is pygad, which is not installed; allowed: {allowed}") from error
+    return pygad
+
+
 class _Island:
     """One PyGAD instance and its histories, from the initial population on."""
 
@@ -57,7 +67,7 @@ class _Island:
         self.genes, self.scores, self.rated = [], [], []
         # the only island may stop by itself
         alone = len(settings.populations) == 1 and settings.stall_generations
-        self.ga = pygad.GA(
+        self.ga = _pygad().GA(
             num_generations=1,
             # ASSUME PyGAD has no default: as many parents as there are places
             num_parents_mating=size,

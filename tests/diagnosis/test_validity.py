@@ -50,7 +50,7 @@ def test_of_a_file_that_is_not_the_robot_s_no_cause_is_named(turned):
         and verdict["no_answer"] in shown.lead
         and shown.short == shown.lead
     )
-    assert not facts["effects"] and facts["unexplained"] and "make check-data" in shown.next
+    assert not facts["effects"] and facts["unexplained"] and "rrru check" in shown.next
     said = " ".join(facts["sentences"])
     assert "backlash" not in said and "eccentricity" not in said and not shown.parts
 

@@ -136,7 +136,7 @@ def test_without_an_answer_that_is_the_headline_and_no_cause_is_on_the_card(fold
     text = _with_file(folder, effects="unexplained", no_answer=why, not_in_model=f"not corrected: {why}")
     card = text[text.index(f'id="answer-{CAMPAIGN}"') : text.index("</article>")]
     assert f'<p class="lead">No cause is named: {why}.</p>' in card and "corrected.urdf" not in card
-    assert "make check-data" in card and "backlash" not in card and "link flexure" not in card
+    assert "rrru check" in card and "backlash" not in card and "link flexure" not in card
 
 
 def test_texts_of_files_are_texts_on_the_page(folder):

@@ -54,8 +54,11 @@ def _shell(line, folder):
     if words[0] == "make":
         finished = subprocess.run(["make", "-n", *words[1:]], cwd=folder, capture_output=True, text=True, check=False)
         return finished.returncode, finished.stdout + finished.stderr
-    if words[0] == "rrru-printer":
-        program = [sys.executable, "-c", "from rrru.studies.printers.command import main; main()", *words[1:]]
+    if words[0] in ("rrru", "rrru-printer"):
+        arguments = ["printer", *words[1:]] if words[0] == "rrru-printer" else words[1:]
+        # a diagnosis takes its time: what it would read is read
+        arguments = ["check", *arguments[1:]] if arguments[0] == "diagnose" else arguments
+        program = [sys.executable, "-m", "rrru.cli", *arguments]
         finished = subprocess.run(program, cwd=folder, capture_output=True, text=True, check=False)
         return finished.returncode, finished.stdout + finished.stderr
     assert words[0] == "snakemake" and words[1] in ("--cores", "--profile"), f"no way to try {line!r}"
