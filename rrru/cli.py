@@ -21,6 +21,7 @@ from rrru.errors import ConfigError, FitError, IngestError, RrruError, Simulatio
 DONE, REFUSED, WRONG, FAILED = range(4)
 _OF_DATA = (IngestError, FitError, UnreachableError, SimulationError)
 _WIDEST = 100
+_UNTESTED = " not tested: "
 _BOLD, _DIM, _PLAIN = "\033[1m", "\033[2m", "\033[0m"
 # options of a robot's file, as arguments of `rrru.load_robot`
 _OF_ROBOT = ("tip", "base", "platform")
@@ -213,8 +214,12 @@ def _print_answer(campaign: Any, diagnosis: Any, page: Path) -> None:
     print(_wrapped(_bold(lead)))
     for sentence in others:
         print(_wrapped(sentence))
-    for note in (*campaign.notes, *diagnosis.verdict["notes"]):
+    notes = (*campaign.notes, *diagnosis.verdict["notes"])
+    untested = [note.partition(_UNTESTED)[0] for note in notes if _UNTESTED in note]
+    for note in (note for note in notes if _UNTESTED not in note):
         print(_dim(_wrapped(f"note: {note}")))
+    if untested:
+        print(_dim(_wrapped(f"note: not tested, for reasons that the page has: {', '.join(untested)}")))
     print()
     for label, path in (("page", page), ("answer as JSON", page.with_name("verdict.json")), ("tables", page.parent)):
         print(f"{label}: {path}")

@@ -43,6 +43,8 @@ def test_a_diagnosis_prints_its_answer_and_where_its_files_are(tmp_path, capsys)
     facts = json.loads((folder / "verdict.json").read_text())
     said = " ".join(out.split())
     assert code == cli.DONE and all(" ".join(sentence.split()) in said for sentence in facts["sentences"])
+    untested = [note.split()[0] for note in facts["notes"] if " not tested: " in note]
+    assert untested and f"for reasons that the page has: {', '.join(untested)}" in said
     assert f"page: {folder / 'report.html'}" in out and (folder / "report.html").is_file() and "\033" not in out
     code, out, _ = ran(capsys, "diagnose", *arguments, "--out", tmp_path, "--json")
     assert code == cli.DONE and json.loads(out) == facts
