@@ -48,9 +48,7 @@ def write_corrected(diagnosis, section, masses, file, seed=0):
         worth = {
             "file_error_mm": error.measured_mm,
             "file_error_fresh_mm": error.fresh_mm,
-            "file_remainder": _remainder(
-                shrink, more, (written, tuple(payload_notes(inference))), error, inference.case
-            ),
+            "file_remainder": _remainder(shrink, more, written, error, inference),
             "file_headline": _headline(written, error),
         }
         shrink, lost = pd.concat([shrink, more], ignore_index=True), written.not_in_model
@@ -79,18 +77,18 @@ def _refuse_worse(more):
         )
 
 
-def _remainder(shrink, more, written, error, case):
+def _remainder(shrink, more, written, error, inference):
     """Residual error of a corrected file beyond that of the diagnosis, in words, empty where negligible.
 
-    written: the Corrected file, and sentences on payload and tilt, which no file holds; error: its FileError; case: the
-    DiagnosisProblem, whose readings it holds for.
+    written: the Corrected file; error: its FileError; inference: the InferenceResult, whose payload and tilt no file
+    holds, and for whose readings the residual error holds.
     """
-    written, of_weight = written
+    of_weight = tuple(payload_notes(inference))
     left, whole = _left_mm(more, "corrected_model"), _left_mm(shrink, "held_out")
     if written.lacking or of_weight:
         names = ", ".join([*map(readable, written.lacking), *(f"that {note}" for note in of_weight)])
         known = [size for size in (error.measured_mm, error.fresh_mm) if np.isfinite(size)]
-        size = f": {max(known):.2g} mm rms remain {_conditions(case)}" if known else ""
+        size = f": {max(known):.2g} mm rms remain {_conditions(inference.case)}" if known else ""
         return f"this {_holds(written)} and not {names}{size}; use corrected_drives"
     if not left > OPTIONS.max_file_remainder_ratio * whole:
         return ""
