@@ -14,7 +14,6 @@ wrong with which value, what is allowed, and what to do.
 
 import html
 import re
-import shutil
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -31,7 +30,7 @@ from rrru.calibration.calibrate import Calibration
 from rrru.diagnosis.diagnose import STEPS
 from rrru.diagnosis.diagnose import Diagnosis as CoreDiagnosis
 from rrru.diagnosis.verdict_text import NOT_CORRECTED
-from rrru.errors import ConfigError, IngestError
+from rrru.errors import ConfigError, IngestError, RrruError
 from rrru.figures.drawing import draw, draw_all
 from rrru.kinematics.robot import Robot
 from rrru.pipeline import config as parts
@@ -53,6 +52,7 @@ from rrru.pipeline.jobs.outputs import (
 from rrru.pipeline.read_config import check_config, merged, read_config
 from rrru.report import page
 from rrru.store import json_files
+from rrru.store.atomic_write import write_text
 
 # called with the name of a step, its number from 0 on and the number of steps, as the step begins
 Progress = Callable[[str, int, int], None]
@@ -232,6 +232,9 @@ class DiagnosisResult:
             raise ConfigError(
                 f"robot {self.campaign.robot.name} has no file that could be corrected; allowed: {allowed}"
             )
+        given = parts.own_robot_file(self.campaign.robot.entry)
+        if given is not None and Path(path).resolve() == given.resolve():
+            raise ConfigError(f"{path} is the robot's own file; allowed: another path, it stays as it is")
         with tempfile.TemporaryDirectory() as folder:
             written = Path(folder, f"corrected.{kind}")
             corrected = self._corrected(str(written))
@@ -271,7 +274,7 @@ class DiagnosisResult:
     def report(self, path: str | Path) -> Path:
         """Write the page alone, one self-contained HTML file."""
         with tempfile.TemporaryDirectory() as folder:
-            shutil.copyfile(self.write(folder), path)
+            write_text(self.write(folder).read_text(encoding="utf-8"), path)
         return Path(path)
 
     def __str__(self) -> str:
@@ -393,14 +396,18 @@ def read_campaign(
     222
     """
     stated = {key: value for key, value in locals().items() if key not in ("data", "robot", "name", "config")}
+    _require(robot, RobotModel, "rrru.load_robot")
+    if not isinstance(data, str | Path | pd.DataFrame):
+        raise ConfigError(f"data is a {type(data).__name__}; allowed: the path of a file, or a pandas DataFrame")
     given = {key: _plain(value) for key, value in stated.items() if value is not None}
-    name = name or ("dataframe" if isinstance(data, pd.DataFrame) else as_name(Path(data).stem))
+    name = name or ("measurements" if isinstance(data, pd.DataFrame) else as_name(Path(data).stem))
     base = read_config() if config is None else config
     section = {"robot": robot.name, "ingest": str(data) if not isinstance(data, pd.DataFrame) else name, **given}
     made = {key: {**base[key]} for key in ("robots", "campaigns")}
     made["robots"][robot.name], made["campaigns"][name] = robot.entry, section
     made = {**base, **made}
     check_config(made)
+    parts.check({**made, "campaigns": {name: section}})
     if isinstance(data, pd.DataFrame):
         return _of_frame(data, robot, name, made)
     return Campaign(name, robot, made, read_job.read(parts.read_settings(made, name)))
@@ -419,7 +426,9 @@ def configured_campaign(name: str, config: Mapping[str, Any] | str | Path) -> Ca
     section = parts.entry(whole, "campaigns", name, "campaign")
     if "ingest" not in section:
         raise ConfigError(f"campaign {name} is a virtual one; allowed: a measured one, or run it by snakemake")
-    parts.check_files({**whole, "campaigns": {name: section}})
+    alone = {**whole, "campaigns": {name: section}}
+    parts.check(alone)
+    parts.check_files(alone)
     robot = RobotModel(section["robot"], whole["robots"][section["robot"]])
     return Campaign(name, robot, whole, read_job.read(parts.read_settings(whole, name)))
 
@@ -433,6 +442,7 @@ def calibrate(campaign: Campaign) -> CalibrationResult:
     >>> round(calibrate(campaign).rms_mm, 3)
     0.083
     """
+    _require(campaign, Campaign, "rrru.read_campaign")
     settings = parts.calibration_settings(campaign.config, campaign.name, *parts.CALIBRATION_KEYS)
     frames, fits = calibrate_job.calibrate(settings, campaign.measurements, campaign.frames["campaigns"])
     return CalibrationResult(campaign, settings, frames, fits)
@@ -461,7 +471,9 @@ def diagnose(
     >>> [cause["name"] for cause in diagnose(campaign).verdict["effects"]]
     ['thermal_growth']
     """
-    stated = {"effects": effects, "own_effects": own_effects, "known": known}
+    _require(campaign, Campaign, "rrru.read_campaign")
+    named = [effects] if isinstance(effects, str) and effects != "all" else effects
+    stated = {"effects": named, "own_effects": own_effects, "known": known}
     gap = {key: _plain(value) for key, value in stated.items() if value is not None}
     config = merged(campaign.config, {"gap": gap} | ({} if seed is None else {"seed": seed}))
     check_config(config)
@@ -492,6 +504,9 @@ def _entry(source: str | Path | Mapping[str, Any], name: str | None) -> tuple[st
     """Name and entry of the section `robots` for the source of a robot."""
     if isinstance(source, Mapping):
         return name or "robot", _plain(source)
+    if not isinstance(source, str | Path):
+        allowed = "a path, a name, or an entry of a configuration as a mapping"
+        raise ConfigError(f"the source of a robot is a {type(source).__name__}; allowed: {allowed}")
     known, path = read_config()["robots"], Path(source)
     if str(source) in known:
         if name not in (None, str(source)):
@@ -521,14 +536,31 @@ def _of_frame(data: pd.DataFrame, robot: RobotModel, name: str, config: dict[str
     """The Campaign of a DataFrame, which is read as a file of parquet is."""
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder, f"{name}.parquet")
-        data.reset_index(drop=True).rename(columns=str).to_parquet(file)
+        pd.DataFrame({str(key): _stored(column) for key, column in data.reset_index(drop=True).items()}).to_parquet(
+            file
+        )
         settings = parts.read_settings(config, name)
         try:
-            frames = read_job.read(settings | {"section": settings["section"] | {"ingest": str(file)}})
+            frames = read_job.read({**settings, "section": {**settings["section"], "ingest": str(file)}})
         except IngestError as error:
             raise IngestError([problem | {"file": f"DataFrame {name}"} for problem in error.problems]) from None
+        except RrruError as error:
+            raise type(error)(str(error).replace(str(file), f"DataFrame {name}")) from None
     frames["campaigns"] = frames["campaigns"].assign(source="DataFrame")
     return Campaign(name, robot, config, frames)
+
+
+def _stored(column: pd.Series) -> pd.Series:
+    """A column as parquet can hold it: cells of several types as texts, which are read as those of a file."""
+    if column.dtype != object:
+        return column
+    return column.map(lambda cell: cell if cell is None or isinstance(cell, str) else str(cell), na_action="ignore")
+
+
+def _require(value: Any, kind: type, made_by: str) -> None:
+    """Raise ConfigError where an argument is not what another function has made."""
+    if not isinstance(value, kind):
+        raise ConfigError(f"got a {type(value).__name__} in place of a {kind.__name__}; allowed: a result of {made_by}")
 
 
 def _paths(folder: Path, name: str, config: Mapping[str, Any]) -> dict[str, str]:

@@ -1,17 +1,18 @@
 """The command `rrru`: from a file of measurements to its cause on the terminal, and into a folder of results.
 
 Exit codes: 0 done; 1 the file is refused, or the data do not determine an answer; 2 a wrong argument, configuration or
-robot; 3 an error of rrru itself, which `--debug` shows with its traceback.
+robot; 3 an error of rrru itself, which `--debug` shows with its traceback; 130 interrupted by Ctrl-C.
 """
 
 import argparse
+import json
 import os
 import shutil
 import sys
 import textwrap
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import yaml
 
@@ -19,12 +20,21 @@ from rrru import __version__
 from rrru.errors import ConfigError, FitError, IngestError, RrruError, SimulationError, UnreachableError
 
 DONE, REFUSED, WRONG, FAILED = range(4)
+INTERRUPTED = 130
 _OF_DATA = (IngestError, FitError, UnreachableError, SimulationError)
 _WIDEST = 100
 _UNTESTED = " not tested: "
 _BOLD, _DIM, _PLAIN = "\033[1m", "\033[2m", "\033[0m"
 # options of a robot's file, as arguments of `rrru.load_robot`
 _OF_ROBOT = ("tip", "base", "platform")
+
+
+class _Parser(argparse.ArgumentParser):
+    """A parser whose errors are one line."""
+
+    def error(self, message: str) -> NoReturn:
+        """End with a message that says where the arguments are explained."""
+        self.exit(WRONG, f"error: {message}; see `{self.prog} --help`\n")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -37,7 +47,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         return run(options)
     except KeyboardInterrupt:
-        return 130
+        print("interrupted", file=sys.stderr)
+        return INTERRUPTED
     except BrokenPipeError:
         # the reader of the output, such as `head`, has ended; Python would report it once more on closing
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -53,18 +64,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _parser() -> argparse.ArgumentParser:
     """The command line."""
-    parser = argparse.ArgumentParser(
+    parser = _Parser(
         prog="rrru",
         description="Why does a calibrated robot still miss? Calibration and diagnosis from a file of measurements.",
         epilog="Exit codes: 0 done; 1 data refused, or no answer from them; 2 wrong argument; 3 failure of rrru.",
     )
     parser.add_argument("--version", action="version", version=f"rrru {__version__}")
-    parser.set_defaults(debug=False)
+    parser.add_argument("--debug", action="store_true", help="show the traceback of an error")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
     about = "calibrate and diagnose: answer, page, JSON, tables, corrected file"
     one = _command(commands, "diagnose", _diagnose, about, _campaign)
     one.add_argument("--out", default="results", metavar="FOLDER", help="folder of results; default: %(default)s")
-    one.add_argument("--effects", nargs="+", metavar="NAME", help="effects that may act; default: all")
+    one.add_argument("--effects", type=_names, metavar="NAME,..", help="effects that may act; default: all")
     one.add_argument("--json", action="store_true", help="print the answer as JSON")
     about = "what is in a file: its columns, what is missing, what a run would refuse, and a section to paste"
     _command(commands, "check", _check, about, _campaign)
@@ -94,7 +105,9 @@ def _command(
         name, help=about, description=f"{about[0].upper()}{about[1:]}."
     )
     parser.set_defaults(run=run)
-    parser.add_argument("--debug", action="store_true", help="show the traceback of an error")
+    # given before the command it holds as well
+    about = "show the traceback of an error"
+    parser.add_argument("--debug", action="store_true", default=argparse.SUPPRESS, help=about)
     for add in arguments:
         add(parser)
     return parser
@@ -105,8 +118,8 @@ def _campaign(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", metavar="FILE", help="file of measurements, or a campaign of --config")
     parser.add_argument("--robot", help="URDF or MJCF file, or a name of `rrru robots`")
     _of_robot(parser)
-    parser.add_argument("--noise", type=float, metavar="MM", help="of the instrument, 1 sigma per axis")
-    parser.add_argument("--noise-rad", type=float, metavar="RAD", help="of measured orientations, 1 sigma per axis")
+    parser.add_argument("--noise", type=_number, metavar="MM", help="of the instrument, 1 sigma per axis")
+    parser.add_argument("--noise-rad", type=_number, metavar="RAD", help="of measured orientations, 1 sigma per axis")
     parser.add_argument("--frame", choices=("robot", "register"), help="register: the instrument's frame is unknown")
     parser.add_argument("--target", action="append", default=[], metavar="NAME=X,Y,Z", help="reflector's place in mm")
     parser.add_argument("--commands", metavar="FILE", help="second file with the commanded positions")
@@ -122,6 +135,7 @@ def _of_robot(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--tip", help="URDF: link that carries the measured point")
     parser.add_argument("--base", help="URDF: fixed link")
     parser.add_argument("--platform", help="MJCF: body that carries the measured point")
+    parser.add_argument("--tool", type=_place, metavar="X,Y,Z", help="measured point in the last frame, mm")
 
 
 def _config(parser: argparse.ArgumentParser) -> None:
@@ -138,6 +152,9 @@ def _stated(options: argparse.Namespace) -> tuple[dict[str, Any], str]:
 
     config = read_config(options.config)
     name, section = options.file, config["campaigns"].get(options.file)
+    if section is None and not Path(options.file).is_file():
+        allowed = "a file of measurements, or a campaign of --config"
+        raise ConfigError(f"{options.file}: there is no such file; allowed: {allowed}")
     if section is None:
         name, section = options.name or as_name(Path(options.file).stem), {"ingest": options.file}
     config, robot = _with_robot(options, config)
@@ -155,7 +172,8 @@ def _with_robot(options: argparse.Namespace, config: dict[str, Any]) -> tuple[di
 
     if options.robot is None or options.robot in config["robots"]:
         return config, options.robot
-    robot = api.load_robot(options.robot, **{key: getattr(options, key) for key in _OF_ROBOT})
+    of_file = {key: getattr(options, key) for key in _OF_ROBOT}
+    robot = api.load_robot(options.robot, tool_mm=options.tool, **of_file)
     return merged(config, {"robots": {robot.name: robot.entry}}), robot.name
 
 
@@ -181,12 +199,32 @@ def _target(text: str) -> tuple[str, list[float]]:
     """Name and place of NAME=X,Y,Z."""
     name, _, place = text.partition("=")
     try:
-        numbers = [float(number) for number in place.split(",")]
+        return name, _place(place)
+    except argparse.ArgumentTypeError:
+        allowed = "NAME=X,Y,Z in mm, such as ball=30,0,60"
+        raise ConfigError(f"--target {text}: no place; allowed: {allowed}") from None
+
+
+def _place(text: str) -> list[float]:
+    """Numbers of X,Y,Z."""
+    try:
+        x, y, z = (float(number) for number in text.split(","))
     except ValueError:
-        numbers = []
-    if len(numbers) != 3:
-        raise ConfigError(f"--target {text}: no place; allowed: NAME=X,Y,Z in mm, such as ball=30,0,60")
-    return name, numbers
+        raise argparse.ArgumentTypeError(f"{text!r} is no place; allowed: X,Y,Z in mm, such as 30,0,60") from None
+    return [x, y, z]
+
+
+def _number(text: str) -> float:
+    """A number of an option."""
+    try:
+        return float(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is no number; allowed: a number such as 0.03") from None
+
+
+def _names(text: str) -> list[str]:
+    """Names between commas."""
+    return [name for name in text.split(",") if name]
 
 
 def _diagnose(options: argparse.Namespace) -> int:
@@ -198,23 +236,34 @@ def _diagnose(options: argparse.Namespace) -> int:
         known = ", ".join(config["robots"])
         raise ConfigError(f"no robot is stated; allowed: --robot with a URDF or MJCF file, or one of {known}")
     campaign = api.configured_campaign(name, config)
+    _require_writable(Path(options.out))
     shown = sys.stderr.isatty()
     diagnosis = api.diagnose(campaign, effects=options.effects, progress=shown)
     page = diagnosis.write(options.out)
     if options.json:
         print(page.with_name("verdict.json").read_text(encoding="utf-8"), end="")
     else:
-        _print_answer(campaign, diagnosis, page)
+        _print_answer(campaign, page)
     return REFUSED if diagnosis.verdict["no_answer"] else DONE
 
 
-def _print_answer(campaign: Any, diagnosis: Any, page: Path) -> None:
+def _require_writable(folder: Path) -> None:
+    """Raise ConfigError, before anything is computed, where results cannot be written to a folder."""
+    place = folder
+    while not place.exists():
+        place = place.parent
+    if not (place.is_dir() and os.access(place, os.W_OK)):
+        raise ConfigError(f"--out {folder}: cannot be written; allowed: a folder that may be written to")
+
+
+def _print_answer(campaign: Any, page: Path) -> None:
     """The answer as text: the sentences, what was noted, and where the results are."""
-    lead, *others = diagnosis.sentences
+    facts = json.loads(page.with_name("verdict.json").read_text(encoding="utf-8"))
+    lead, *others = facts["sentences"]
     print(_wrapped(_bold(lead)))
     for sentence in others:
         print(_wrapped(sentence))
-    notes = (*campaign.notes, *diagnosis.verdict["notes"])
+    notes = (*campaign.notes, *facts["notes"])
     untested = [note.partition(_UNTESTED)[0] for note in notes if _UNTESTED in note]
     for note in (note for note in notes if _UNTESTED not in note):
         print(_dim(_wrapped(f"note: {note}")))
@@ -223,8 +272,11 @@ def _print_answer(campaign: Any, diagnosis: Any, page: Path) -> None:
     print()
     for label, path in (("page", page), ("answer as JSON", page.with_name("verdict.json")), ("tables", page.parent)):
         print(f"{label}: {path}")
-    for path in sorted(page.parent.glob("corrected.*")):
+    file = facts["corrected_file"]
+    for path in sorted(page.parent.glob("corrected.*")) if file else ():
         print(f"corrected file: {path}")
+        for sentence in filter(None, (file["remainder"], *file["not_in_model"])):
+            print(_wrapped(f"  {sentence}"))
 
 
 def _check(options: argparse.Namespace) -> int:

@@ -92,6 +92,43 @@ def test_a_refused_data_frame_is_named_without_a_path(monkeypatch):
         rrru.read_campaign(frame, rrru.load_robot("rrru3"), name="mine")
 
 
+def test_a_text_in_a_data_frame_is_refused_with_its_row(monkeypatch):
+    monkeypatch.chdir(ROOT)
+    frame = pd.read_csv(FIELD).astype({"measured_y_mm": object})
+    frame.loc[20, "measured_y_mm"] = "beam lost"
+    with pytest.raises(
+        rrru.IngestError, match=r"^DataFrame measurements, row 21, column measured_y_mm: got 'beam lost'"
+    ):
+        rrru.read_campaign(frame, rrru.load_robot("rrru3"))
+
+
+def test_what_is_no_result_of_the_library_is_refused_in_words():
+    robot = rrru.load_robot("rrru3")
+    for call, said in (
+        (lambda: rrru.load_robot(None), "the source of a robot is a NoneType"),
+        (lambda: rrru.read_campaign([1.0], robot), "data is a list"),
+        (lambda: rrru.read_campaign(FIELD, "rrru3"), "got a str in place of a RobotModel"),
+        (lambda: rrru.calibrate(None), "got a NoneType in place of a Campaign"),
+        (lambda: rrru.diagnose("x"), "got a str in place of a Campaign"),
+    ):
+        with pytest.raises(rrru.ConfigError, match=said):
+            call()
+
+
+def test_one_stated_reflector_needs_no_column(arm):
+    """The reflector's place from the arm's own kinematics: a point 60 mm out and 40 mm up on the flange."""
+    generator, place = np.random.default_rng(8), np.array([60.0, 0.0, 40.0])
+    drives = HOME + generator.uniform(-0.6, 0.6, (60, len(HOME)))
+    seen = arm.mechanism.solve(drives, arm.mechanism.forward(drives)).point(place)
+    frame = pd.DataFrame(drives, columns=arm.drives)
+    frame[["measured_x_mm", "measured_y_mm", "measured_z_mm"]] = seen + generator.normal(0.0, NOISE_MM, seen.shape)
+    campaign = rrru.read_campaign(frame, arm, targets={"ball": place}, noise_mm=NOISE_MM)
+    assert "no column target: every reading is of ball" in campaign.notes
+    assert abs(rrru.calibrate(campaign).rms_mm / (NOISE_MM * np.sqrt(3.0)) - 1.0) < 0.3
+    with pytest.raises(rrru.IngestError, match="column target: got no such column; allowed: a column with each row's"):
+        rrru.read_campaign(frame, arm, targets={"ball": place, "other": place}, noise_mm=NOISE_MM)
+
+
 def test_a_zero_that_is_off_is_found_and_the_corrected_file_holds_it(arm, tmp_path):
     """Truth from the arm's kinematics alone: the zero of joint 2 within its interval, the file as good as the noise."""
     generator = np.random.default_rng(4)
@@ -105,6 +142,8 @@ def test_a_zero_that_is_off_is_found_and_the_corrected_file_holds_it(arm, tmp_pa
     diagnosis = rrru.diagnose(campaign, effects=["drive_compliance"], progress=lambda *step: steps.append(step))
     assert diagnosis.verdict["effects"] == [] and [step[1] for step in steps] == list(range(5))
     assert diagnosis.sentences[0] in str(diagnosis) and "<p>" in diagnosis._repr_html_()
+    with pytest.raises(rrru.ConfigError, match="is the robot's own file"):
+        diagnosis.write_corrected(ARM)
     written = diagnosis.write_corrected(tmp_path / "corrected.urdf")
     assert written.not_corrected == "" and written.verdict["corrected_file"]["error_fresh_mm"] < NOISE_MM
     fresh = HOME + generator.uniform(-0.6, 0.6, (50, len(HOME)))

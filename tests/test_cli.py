@@ -10,7 +10,7 @@ import pytest
 import yaml
 
 import rrru
-from rrru import cli
+from rrru import api, cli
 from rrru.studies.blind_validation.sentences.mistakes import MISTAKES, shows, with_mistake
 from tests.places import ROOT
 
@@ -33,7 +33,7 @@ def test_it_runs_as_a_command_of_its_own_in_any_folder(tmp_path):
     ended = subprocess.run([sys.executable, "-c", code, "--version"], capture_output=True, text=True, cwd=tmp_path)
     assert (ended.returncode, ended.stdout.strip()) == (0, f"rrru {rrru.__version__}")
     ended = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=tmp_path)
-    assert ended.returncode == cli.WRONG and "usage: rrru" in ended.stderr
+    assert ended.returncode == cli.WRONG and "see `rrru --help`" in ended.stderr
 
 
 def test_a_diagnosis_prints_its_answer_and_where_its_files_are(tmp_path, capsys):
@@ -60,7 +60,10 @@ def test_robots_and_effects_are_listed(capsys):
 @pytest.mark.parametrize(
     ("arguments", "code", "said"),
     [
-        (("diagnose", "nothere.csv", "--robot", "rrru3"), cli.WRONG, "there is no file nothere.csv"),
+        (("diagnose", "nothere.csv", "--robot", "rrru3"), cli.WRONG, "nothere.csv: there is no such file"),
+        (("check", "nothere.csv", "--robot", "rrru3"), cli.WRONG, "nothere.csv: there is no such file"),
+        (("diagnose", "data/field_12.csv", "--robot", "rrru3", "--noise", "0"), cli.WRONG, "0, which no instrument"),
+        (("diagnose", "data/field_12.csv", "--robot", "rrru3", "--effects", "backlsh"), cli.WRONG, "mean backlash?"),
         (("diagnose", "data/field_12.csv"), cli.WRONG, "no robot is stated"),
         (("diagnose", "data/field_12.csv", "--robot", "x.urdf"), cli.WRONG, "robot 'x.urdf': there is no such file"),
         (("diagnose", "README.md", "--robot", "rrru3"), cli.REFUSED, "README.md"),
@@ -100,6 +103,31 @@ def test_a_gross_mistake_in_a_file_gets_one_message(number, tmp_path, capsys):
     # units and frame are proposed, the rest is refused; either way the key to write is there
     assert (code == cli.REFUSED) == ("refused: " in out) and not message
     assert all(re.search(words, out, re.DOTALL) for words in handed.words)
+
+
+def test_a_wrong_option_is_one_line(capsys):
+    with pytest.raises(SystemExit) as ended:
+        cli.main(["diagnose", "data/field_12.csv", "--noise", "abc"])
+    message = capsys.readouterr().err
+    assert ended.value.code == cli.WRONG and message.count("\n") == 1
+    assert "argument --noise: 'abc' is no number; allowed: a number such as 0.03; see `rrru diagnose --help`" in message
+
+
+def test_a_folder_that_cannot_be_written_is_found_before_anything_is_computed(tmp_path, capsys, monkeypatch):
+    (tmp_path / "file").write_text("")
+    monkeypatch.setattr(api, "diagnose", lambda *_, **__: pytest.fail("computed"))
+    arguments = ("data/field_12.csv", "--robot", "rrru3", "--noise", "0.02", "--out", tmp_path / "file/results")
+    code, _, message = ran(capsys, "diagnose", *arguments)
+    assert code == cli.WRONG and "cannot be written" in message
+
+
+def test_ctrl_c_ends_with_a_word(monkeypatch, capsys):
+    def interrupted(_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(cli, "_robots", interrupted)
+    code, _, message = ran(capsys, "robots")
+    assert code == cli.INTERRUPTED and message == "interrupted\n"
 
 
 def test_a_failure_of_the_program_says_how_to_see_more(monkeypatch, capsys):

@@ -6,6 +6,7 @@ A file of the library has a function `for_robot`, from a robot to its Effect, No
 import importlib
 import pkgutil
 from dataclasses import fields
+from difflib import get_close_matches
 from functools import partial
 from pathlib import Path
 
@@ -75,7 +76,9 @@ def find(name, robot):
         return _module(name).for_robot(robot)
     module_name, colon, object_name = name.partition(":")
     if not (colon and object_name and all(part.isidentifier() for part in module_name.split("."))):
-        raise ConfigError(f"unknown effect {name!r}; known: {', '.join(NAMES)}, or module:object for one of your own")
+        near = get_close_matches(name, NAMES, n=1)
+        meant = f"; did you mean {near[0]}?" if near else f"; known: {', '.join(NAMES)}"
+        raise ConfigError(f"unknown effect {name!r}{meant}, or module:object for one of your own")
     return _complete(name, _load(name))
 
 

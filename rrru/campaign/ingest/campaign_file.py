@@ -100,6 +100,9 @@ def _read(spec: IngestSpec, mechanism: Robot) -> tuple[Sheet, list[str]]:
     drives = [*mechanism.parts.columns]
     spec.check_drives(drives)
     frame = spec.as_meant(convert(spec, mechanism, found, cells, problems), drives)
+    if spec.targets and "target" not in frame:
+        frame, said = _one_target(frame, spec, problems)
+        notes += said
     if not set(REQUIRED) - set(COMMAND) <= set(frame) or len(set(cells.names)) < len(cells.names):
         problems.refuse()
     if not problems:
@@ -115,6 +118,16 @@ def _read(spec: IngestSpec, mechanism: Robot) -> tuple[Sheet, list[str]]:
     frame, more = number_runs(frame, spec.motion is not None and spec.motion.stops)
     sheet = Sheet(spec, mechanism, problems, found, frame)
     return sheet, notes + more + _notes_on_columns(sheet)
+
+
+def _one_target(frame: pd.DataFrame, spec: IngestSpec, problems: Problems) -> tuple[pd.DataFrame, list[str]]:
+    """The frame with the only stated target in every row, and a note; with several the file has to name each row's."""
+    if len(spec.targets) == 1:
+        (name,) = spec.targets
+        return frame.assign(target=name), [f"no column target: every reading is of {name}"]
+    allowed = f"a column with each row's one of {', '.join(spec.targets)}"
+    problems.add("missing column", column="target", value="no such column", allowed=allowed)
+    return frame, []
 
 
 def _refuse_gross_error(sheet: Sheet, unit_stated: bool) -> list[str]:

@@ -87,7 +87,7 @@ def _of_targets(file: GrossFile, found: Hypothesis) -> str:
 def place_words(places: Mapping[str, np.ndarray]) -> str:
     """The key `targets` with places (3,) in mm by name, or where the tool is, whose name is empty."""
     if "" in places:
-        return f"a tool at {position_text(places[''])}"
+        return f"a tool at {position_text(places[''])} (the robot's tool_mm)"
     entries = (f"{name}: [{', '.join(f'{value:.4g}' for value in place)}]" for name, place in places.items())
     return f"targets: {{{', '.join(entries)}}}"
 

@@ -111,7 +111,8 @@ def _used(section, cells, mechanism):
     """The used, unused and missing columns."""
     spec = replace(IngestSpec.from_config(section), extra_columns="ignore")
     found, extra = resolve(spec, cells, mechanism, Problems(spec.path))
-    same = [ours for ours, theirs in found.items() if ours == theirs]
+    made = {"trajectory"} if any(note.startswith("no column trajectory") for note in cells.notes) else set()
+    same = [ours for ours, theirs in found.items() if ours == theirs and ours not in made]
     if same:
         yield f"used: {', '.join(same)}"
     yield from (f"used: {theirs!r} as {ours}" for ours, theirs in found.items() if ours != theirs)

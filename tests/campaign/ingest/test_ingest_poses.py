@@ -386,7 +386,9 @@ def test_a_wrong_height_in_the_robots_frame_is_named(tmp_path):
     off = 0.03 * robot.size_mm
     table = _in_the_robots_frame(robot, (0.0, 0.0, off), np.random.default_rng(3))
     (note,) = (one for one in _taken(tmp_path, table, robot).notes if "see that unit, frame and rows" in one)
-    place = re.search(r"; a tool at \((.*), (.*), (.*)\) mm would fit to less than 20 % of that", note)
+    place = re.search(
+        r"; a tool at \((.*), (.*), (.*)\) mm \(the robot's tool_mm\) would fit to less than 20 % of that", note
+    )
     np.testing.assert_allclose(np.array(place.groups(), dtype=float), (0.0, 0.0, off), atol=0.02)
 
 

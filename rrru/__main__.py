@@ -1,0 +1,7 @@
+"""`python -m rrru`, the same as the command `rrru`."""
+
+import sys
+
+from rrru.cli import main
+
+sys.exit(main())
