@@ -104,15 +104,20 @@ def _content(section, cells):
     """The file, its size and its format."""
     kind = section.get("format") or "as its ending says"
     more = f", commands from {section['commands']}" if "commands" in section else ""
-    return f"{section['ingest']}: {len(cells.rows)} rows, {len(cells.names)} columns, format {kind}{more}"
+    columns = len(cells.names) - len(_added(cells))
+    return f"{section['ingest']}: {len(cells.rows)} rows, {columns} columns, format {kind}{more}"
+
+
+def _added(cells):
+    """Columns of the cells that the file itself does not have."""
+    return {"trajectory"} if any(note.startswith("no column trajectory") for note in cells.notes) else set()
 
 
 def _used(section, cells, mechanism):
     """The used, unused and missing columns."""
     spec = replace(IngestSpec.from_config(section), extra_columns="ignore")
     found, extra = resolve(spec, cells, mechanism, Problems(spec.path))
-    made = {"trajectory"} if any(note.startswith("no column trajectory") for note in cells.notes) else set()
-    same = [ours for ours, theirs in found.items() if ours == theirs and ours not in made]
+    same = [ours for ours, theirs in found.items() if ours == theirs and ours not in _added(cells)]
     if same:
         yield f"used: {', '.join(same)}"
     yield from (f"used: {theirs!r} as {ours}" for ours, theirs in found.items() if ours != theirs)

@@ -48,8 +48,20 @@ class Proposal:
 def propose(section, config):
     """The Proposal for a section that names file and robot; raises IngestError for a file that cannot be read."""
     mechanism = setup.mechanism(parts.robot(config, section))
+    if "columns" in section and (stated := _as_stated(section, mechanism)):
+        return _with_motion(stated)
     cells, section = _with_columns(_with_formats(section), mechanism)
     return _with_motion(Proposal(*_fitting(section, cells, mechanism)))
+
+
+def _as_stated(section, mechanism):
+    """The Proposal of a section that states its columns and is accepted as it is, None for any other."""
+    try:
+        spec = IngestSpec.from_config(section)
+        cells = with_commands(spec, read_cells(Path(spec.path), spec.format, Problems(spec.path)), Problems(spec.path))
+        return Proposal(section, cells, mechanism, ingest(spec, mechanism), ())
+    except RrruError:
+        return None
 
 
 def _with_motion(found):

@@ -144,6 +144,16 @@ def test_a_bad_cell_does_not_make_the_robot_wrong(tmp_path):
     assert found.refused and not any("wrong robot" in line for line in found.lines)
 
 
+def test_a_section_that_states_its_columns_and_is_accepted_stays_as_it_is(capsys, monkeypatch):
+    """A real robot's file whose other columns look like commands, in another unit."""
+    monkeypatch.chdir(ROOT)
+    assert main(["series_D", "--config", "examples/ur10.yaml"]) == 0
+    text = capsys.readouterr().out
+    assert "632 rows, 27 columns" in text and "trajectory" not in text.partition("missing:")[0]
+    stated = yaml.safe_load((ROOT / "examples/ur10.yaml").read_text())["campaigns"]
+    assert yaml.safe_load(text.partition("overlay to paste:")[2]) == {"campaigns": stated}
+
+
 def test_what_is_refused_is_not_offered_for_pasting(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(ROOT)
     FIELD.drop(columns="measured_x_mm").to_csv(tmp_path / "a.csv", index=False)
