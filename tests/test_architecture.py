@@ -31,6 +31,7 @@ _FLOORS = {
     "report": 12,
     "api": 13,
     "cli": 14,
+    "__main__": 15,
 }
 # tables in, figures out: they import none of the computing packages
 _APART = {"store": {"errors"}, "figures": {"errors", "store"}}
