@@ -52,7 +52,7 @@ from rrru.pipeline.jobs.outputs import (
 from rrru.pipeline.read_config import check_config, merged, read_config
 from rrru.report import page
 from rrru.store import json_files
-from rrru.store.atomic_write import write_text
+from rrru.store.atomic_write import whole, write_text
 
 # called with the name of a step, its number from 0 on and the number of steps, as the step begins
 Progress = Callable[[str, int, int], None]
@@ -184,7 +184,7 @@ class DiagnosisResult:
         """The answer in words, the most important sentence first."""
         return tuple(self.verdict["sentences"])
 
-    @property
+    @cached_property
     def tables(self) -> dict[str, pd.DataFrame]:
         """All tables of the diagnosis by name, see results/README.md."""
         return diagnose_job.frames_of(self._settings, self.result)
@@ -235,13 +235,12 @@ class DiagnosisResult:
         given = parts.own_robot_file(self.campaign.robot.entry)
         if given is not None and Path(path).resolve() == given.resolve():
             raise ConfigError(f"{path} is the robot's own file; allowed: another path, it stays as it is")
-        with tempfile.TemporaryDirectory() as folder:
-            written = Path(folder, f"corrected.{kind}")
-            corrected = self._corrected(str(written))
+        # next to its place, since paths of meshes are relative to the file
+        with whole(path) as (partial,):
+            corrected = self._corrected(str(partial))
             if why := corrected.not_corrected:
                 raise ConfigError(f"robot {self.campaign.robot.name}: {why}")
-        # again at its place: paths of meshes are relative to the file
-        return self._corrected(str(path))
+        return corrected
 
     @property
     def not_corrected(self) -> str:
