@@ -15,7 +15,7 @@ from rrru.campaign.ingest.frames import Frames
 from rrru.campaign.ingest.mistakes import Mistakes
 from rrru.campaign.ingest.sheet import COMMAND, MEASURED, TARGET, TURNS
 from rrru.campaign.ingest.spec import MM, RAD, IngestSpec
-from rrru.campaign.ingest.zero_offsets import lost_zeros
+from rrru.campaign.ingest.zero_offsets import found_zeros
 from rrru.campaign.target_registration import TargetReadings, affine_rms, axes_by_turning, register_targets
 from rrru.errors import FitError
 from rrru.kinematics.chain import Poses
@@ -196,7 +196,7 @@ class GrossFile:
         world, right = np.zeros(len(at), dtype=bool), np.ones(len(at), dtype=bool)
         frames = Frames(self.measured_mm[at], names, self.place_mm[self.target[at]], world, right, True)
         seen = Readings(frames.seen_mm, names, frames.place_mm, on_world=world)
-        zeros = lost_zeros(self.robot, (values, self._guess(values, at)), seen, frames.framed)
+        zeros, _ = found_zeros(self.robot, (values, self._guess(values, at)), seen, frames.framed)
         return replace(self, drive=self.drive + zeros).hypothesis(self.given)
 
     def spread_mm(self) -> float:

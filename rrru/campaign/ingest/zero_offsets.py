@@ -36,11 +36,6 @@ _LOST_MM = 1e4
 _LEAST = 1e-2
 
 
-def lost_zeros(robot, driven, seen, frames):
-    """Zero offsets (K,) of the actuator values that explain the residual of the frames, see `found_zeros`."""
-    return found_zeros(robot, driven, seen, frames)[0]
-
-
 def found_zeros(robot, driven, seen, frames):
     """Zero offsets (K,) of the actuator values that explain the residual of the frames; zero where they do not.
 
