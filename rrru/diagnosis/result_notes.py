@@ -8,13 +8,13 @@ from rrru.diagnosis.make_problem import UNLOADED
 from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.payload_nuisance import WEIGHT
 from rrru.diagnosis.problem import GEOMETRY
-from rrru.effects.protocol import bears_load
+from rrru.effects.protocol import is_compliance
 from rrru.kinematics.legs import WORLD
 
-# said where an effect depends on loads of a robot whose file states no masses: words that the size is not shown then
+# said where an effect depends on loads of a robot whose file states no masses
 MASSES_UNKNOWN = (
-    "no masses of the links are stated: without them no size of a compliance is determined, and the weight of the "
-    "links may appear as another effect, state them in the robot's file (`inertial`, or `mass_kg` of a row of `dh`)"
+    "no masses of the links are stated: without them payloads alone tell the size of a compliance, and the weight of "
+    "the links may appear as another effect, state them in the robot's file (`inertial`, or `mass_kg` of a row of `dh`)"
 )
 # said where a part of the gap looks like random error and no pose was measured under the same conditions again
 REPEATABILITY_UNKNOWN = "repeatability is unknown: no pose was measured twice"
@@ -95,7 +95,7 @@ def undetermined_payload_notes(inference):
 def mass_notes(case):
     """The sentence that loads are not known, where an effect needs them and the links of the robot have no masses."""
     untested = {name for name, why in case.untestable.items() if why == UNLOADED}
-    if case.massless and (untested or any(bears_load(effect) for effect in case.effects.values())):
+    if case.massless and (untested or any(is_compliance(effect) for effect in case.effects.values())):
         yield MASSES_UNKNOWN
 
 

@@ -38,16 +38,21 @@ def per_leg(effect):
     return bool((effect.coordinates.legs > 0).all())
 
 
-def variants(effect):
-    """All terms of an effect: each shape with each choice of legs that makes a difference.
+def one_value_for_all(effect):
+    """Whether an effect may have one value for all legs.
 
-    One value for all legs is tried for coordinates that cannot be negative: sizes of one design, unlike the signed
-    errors of an assembly, and unlike the joints of an arm.
+    That is for coordinates that cannot be negative: sizes of one design, unlike the signed errors of an assembly, and
+    unlike the joints of an arm.
     """
+    return per_leg(effect) and effect.coordinates.alike and bool(effect.coordinates.positive.all())
+
+
+def variants(effect):
+    """All terms of an effect: each shape with each choice of legs that makes a difference."""
     coordinates, legs = effect.coordinates, per_leg(effect)
     choices = (
         EACH,
-        *((SAME,) if legs and coordinates.alike and coordinates.positive.all() else ()),
+        *((SAME,) if one_value_for_all(effect) else ()),
         *(np.unique(coordinates.legs).tolist() if legs else ()),
     )
     return tuple(EffectTerm(effect.name, shape, legs) for shape in range(len(coordinates.shapes)) for legs in choices)

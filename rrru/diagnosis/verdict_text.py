@@ -314,8 +314,14 @@ def _cause(effect, follow, with_shares, facts):
     if effect["share"] is not None:
         share = f"{share_with_interval(effect, follow)} is" if with_shares else f"{rounded(effect['rms_mm'])} mm is"
     place = f" {effect['place']}" if effect["place"] else ""
-    unsized = MASSES_UNKNOWN in facts["notes"] and any(_per_load(number["unit"]) for number in effect["parameters"])
-    sizes = [] if unsized else _sizes(effect["parameters"])
+    parameters = effect["parameters"]
+    per_load = [number for number in parameters if _per_load(number["unit"])]
+    massless = MASSES_UNKNOWN in facts["notes"] and bool(per_load)
+    if massless:
+        # only where the weight of the links has parameters of its own is a compliance not a multiple of it
+        parameters = per_load if len(per_load) < len(parameters) else []
+    sizes = _sizes(parameters)
+    unsized = massless and not sizes
     listed = ", ".join(sizes) if len(sizes) <= OPTIONS.max_listed_numbers else f"{len(sizes)} numbers"
     size = f", {listed}" if sizes else ""
     meaning = f": {effect['meaning']}" if effect["meaning"] else ""

@@ -18,6 +18,9 @@ part is confounded with errors of lengths and drives. A second payload separates
 Assumptions: linear spring (harmonic drives stiffen with torque by a factor of about two over their range), no lost
 motion (that is `backlash`), no vibration (a motion slow against the drive's resonance).
 
+Where an arm's file states no masses of its links, the deflection under their weight has parameters of its own beside
+the compliance, which then stands for the payload alone: see `rrru.effects.link_weights`.
+
 A joint that a rod or belt makes follow drives deflects under the loads about itself, in addition to what its drives do.
 
 A carriage on a screw or belt deflects likewise: b_i errs by k_i F_i with the force F_i of all loads along its rail.
@@ -27,6 +30,9 @@ Journal of Dynamic Systems, Measurement, and Control 109, 1987 (joint as a torsi
 on 50 kN m/rad make 3e-4 rad.
 """
 
+import numpy as np
+
+from rrru.effects.link_weights import link_weights
 from rrru.effects.protocol import Effect, drive_parameters, of_drives, plain_coordinates
 from rrru.parameters import ParameterSet
 
@@ -41,7 +47,11 @@ _TYPICAL = {"rad": 2e-8, "mm": 1e-3}
 def for_robot(robot):
     """The effect model for all drives, and after them all joints that follow some."""
     springs = (*robot.parts.drives, *robot.parts.followers)
-    parameters = ParameterSet(drive_parameters(springs, _SOURCE, ("compliance", _HIGHEST)))
+    own = drive_parameters(springs, _SOURCE, ("compliance", _HIGHEST))
+    weights = link_weights(robot)
+    if weights is not None:
+        return _of_unknown_masses(own, weights)
+    parameters = ParameterSet(own)
     coordinates = plain_coordinates(parameters, of_drives(springs, _TYPICAL))
     return Effect("drive_compliance", parameters, coordinates, _wind_up, ("drive_load",))
 
@@ -51,3 +61,27 @@ def _wind_up(motion, values):
     count = motion.drive_load.shape[1]
     followed = motion.at_followers(values[count:] * motion.follower_load)
     return motion.at_drives(values[:count] * motion.drive_load) + followed
+
+
+def _of_unknown_masses(compliances, weights):
+    """The effect model for an arm whose links have no stated masses."""
+    parameters, typical, sizes = [], [], []
+    for drive, compliance in enumerate(compliances):
+        further, further_sizes = weights.parameters(drive)
+        parameters += [compliance, *further]
+        typical += [_TYPICAL["rad"], *further_sizes]
+        sizes.append(1 + len(further))
+
+    def functions(motion):
+        """By drive the deflections (n, 1 + c) under a unit of its compliance and of each parameter of weight."""
+        each = zip(motion.drive_load.T, weights.functions(motion), strict=True)
+        return [np.column_stack([load, of_links]) for load, of_links in each]
+
+    def deflected(motion, values):
+        """Changes of the drives' values under the parameters."""
+        parts = zip(functions(motion), np.split(values, np.cumsum(sizes)[:-1]), strict=True)
+        return motion.at_drives(np.stack([f @ own for f, own in parts], axis=1))
+
+    parameter_set = ParameterSet(tuple(parameters))
+    coordinates = plain_coordinates(parameter_set, np.array(typical))
+    return Effect("drive_compliance", parameter_set, coordinates, deflected, along_drives=functions)

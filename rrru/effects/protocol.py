@@ -325,6 +325,11 @@ def bears_load(effect: Any) -> bool:
     return not LOADS.keys().isdisjoint(effect.needs)
 
 
+def is_compliance(effect: Any) -> bool:
+    """Whether an effect depends on the loads, or on weights that it has as parameters in their place."""
+    return bears_load(effect) or any("N" in parameter.unit for parameter in effect.parameters)
+
+
 def is_compliant(effect: Any) -> bool:
     """Whether an effect, or the discrepancy basis, grows with the loads, so that payload and tilt matter."""
     return bears_load(effect) and not effect.switches
