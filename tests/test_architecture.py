@@ -2,6 +2,7 @@
 
 import ast
 import re
+from functools import cache
 
 import pytest
 
@@ -47,12 +48,22 @@ _LIBRARIES = {
 _FILES = sorted((_ROOT / "rrru").rglob("*.py"))
 
 
+@cache
+def _nodes(path):
+    """All nodes of a file's syntax tree."""
+    return [*ast.walk(ast.parse(path.read_text()))]
+
+
+@cache
 def _imports(path):
-    for node in ast.walk(ast.parse(path.read_text())):
+    """Names that a file imports, wherever they stand."""
+    names = []
+    for node in _nodes(path):
         if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names)
+            names += [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
-            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+            names += [f"{node.module}.{alias.name}" for alias in node.names]
+    return names
 
 
 @pytest.mark.parametrize("path", _FILES, ids=lambda p: p.relative_to(_ROOT).as_posix())
@@ -79,7 +90,7 @@ def test_only_the_named_files_know_a_library(library):
 def test_nobody_uses_global_random_state():
     """Only generators: no numpy.random function but default_rng, SeedSequence and Generator."""
     for path in _FILES:
-        for node in ast.walk(ast.parse(path.read_text())):
+        for node in _nodes(path):
             if (
                 isinstance(node, ast.Attribute)
                 and isinstance(node.value, ast.Attribute)
@@ -94,9 +105,8 @@ def test_nothing_runs_code_that_a_file_holds():
     """Modules by the user's names come in at one place; no text is evaluated, unpickled or handed to a shell."""
     forbidden = {"eval", "exec", "__import__", "pickle", "marshal", "subprocess", "system", "popen", "UnsafeLoader"}
     for path in [*_FILES, *sorted((_ROOT / "workflow/scripts").glob("*.py"))]:
-        tree = ast.parse(path.read_text())
-        used = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)}
-        used |= {node.attr for node in ast.walk(tree) if isinstance(node, ast.Attribute)}
+        used = {node.id for node in _nodes(path) if isinstance(node, ast.Name)}
+        used |= {node.attr for node in _nodes(path) if isinstance(node, ast.Attribute)}
         used |= {name.split(".")[0] for name in _imports(path)}
         assert not used & forbidden, f"{path} uses {used & forbidden}"
     rules = [_ROOT / "Snakefile", *sorted((_ROOT / "workflow/rules").rglob("*.smk"))]

@@ -38,6 +38,8 @@ def test_it_runs_as_a_command_of_its_own_in_any_folder(tmp_path):
 
 def test_a_diagnosis_prints_its_answer_and_where_its_files_are(tmp_path, capsys):
     arguments = ("data/field_12.csv", "--robot", "rrru3", "--noise", "0.02", "--set", "platform_mass_kg=3.0")
+    # two that can be tested and two that this file cannot show
+    arguments += ("--effects", "backlash,thermal_growth,read_before_rest,thermal_expansion")
     code, out, _ = ran(capsys, "diagnose", *arguments, "--out", tmp_path)
     folder = tmp_path / "campaigns/field_12"
     facts = json.loads((folder / "verdict.json").read_text())

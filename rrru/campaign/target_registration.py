@@ -18,6 +18,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
+from rrru.campaign.registration_kernel import descend
 from rrru.errors import FitError
 
 FloatArray = npt.NDArray[np.float64]
@@ -156,10 +157,6 @@ class _Eliminated:
     left: FloatArray
     centre_mm: FloatArray
 
-    def residual(self, rotations: FloatArray) -> FloatArray:
-        """Residuals (m, r) of rotations (m, 3, 3)."""
-        return np.asarray(rotations.reshape(-1, 9) @ self.rest.T - self.left)
-
     def slopes(self, rotations: FloatArray) -> FloatArray:
         """Derivative (m, r, 3) of the residual by a small turn, exp(w) Q, of rotations (m, 3, 3)."""
         # cross products of the axes with the columns, written out: a general product takes ten times as long
@@ -239,29 +236,9 @@ def _best_rotation(linear: _Eliminated, rotations: FloatArray) -> FloatArray:
 
 def _descended(linear: _Eliminated, rotations: FloatArray, iterations: int) -> tuple[FloatArray, FloatArray]:
     """Rotations (m, 3, 3) and costs (m,) after so many steps of Levenberg's and Marquardt's method."""
-    residual = linear.residual(rotations)
-    cost, damping = (residual**2).sum(axis=1), np.full(len(rotations), 1e-3)
-    for _ in range(iterations):
-        slopes = linear.slopes(rotations)
-        normal, gradient = np.einsum("mri,mrj->mij", slopes, slopes), np.einsum("mri,mr->mi", slopes, residual)
-        size = np.trace(normal, axis1=1, axis2=2)[:, None, None] * _EYE
-        step = -np.linalg.solve(normal + (damping[:, None, None] + 1e-14) * size + 1e-300 * _EYE, gradient[..., None])
-        step = step[:, :, 0]
-        step = step * np.minimum(1.0, 1.0 / np.maximum(_lengths(step), 1e-300))[:, None]
-        trial = Rotation.from_rotvec(step).as_matrix() @ rotations
-        moved = linear.residual(trial)
-        lower = (after := (moved**2).sum(axis=1)) < cost
-        rotations = np.where(lower[:, None, None], trial, rotations)
-        residual, cost = np.where(lower[:, None], moved, residual), np.where(lower, after, cost)
-        damping = np.where(lower, 0.1 * damping, np.maximum(10.0 * damping, 1e-6))
-        if _lengths(step).max() < _TURN_TOLERANCE_RAD:
-            break
-    return rotations, cost
-
-
-def _lengths(vectors: FloatArray) -> FloatArray:
-    """Lengths (m,) of vectors (m, 3)."""
-    return np.asarray(np.sqrt((vectors * vectors).sum(axis=1)))
+    rest, left, starts = (np.ascontiguousarray(part) for part in (linear.rest, linear.left, rotations))
+    found, cost = descend(rest, left, starts, iterations, _TURN_TOLERANCE_RAD)
+    return np.asarray(found), np.asarray(cost)
 
 
 def _completed(readings: TargetReadings, linear: _Eliminated, rotation: FloatArray) -> TargetRegistration:

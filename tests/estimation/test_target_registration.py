@@ -5,6 +5,7 @@ import pytest
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
+from rrru.campaign.registration_kernel import descend
 from rrru.campaign.target_registration import TargetReadings, register_targets
 from rrru.errors import FitError
 
@@ -125,3 +126,17 @@ def test_points_on_a_line_leave_the_turn_about_it_open():
     np.testing.assert_allclose(np.abs(found.undetermined), [[0.6, 0.0, 0.8]], atol=1e-6)
     with pytest.raises(FitError, match="2 readings of targets; allowed: at least 3"):
         register_targets(TargetReadings(body[:2], turn[:2], body[:2], none[:2], np.zeros((1, 3))))
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_the_compiled_search_finds_the_minimum_that_a_plain_one_finds(seed):
+    """Of a quadratic form of a rotation's entries, from the same start, by SciPy with finite differences."""
+    draw = np.random.default_rng(seed)
+    rest, start = draw.normal(size=(10, 9)), Rotation.random(rng=draw)
+    truth = Rotation.from_rotvec(draw.normal(0.0, 0.2, 3)) * start
+    left = rest @ truth.as_matrix().ravel() + draw.normal(0.0, 0.01, 10)
+    (found,), (cost,) = descend(rest, left, start.as_matrix()[None], 60, 1e-12)
+    plain = least_squares(lambda w: rest @ (Rotation.from_rotvec(w) * start).as_matrix().ravel() - left, np.zeros(3))
+    np.testing.assert_allclose(found, (Rotation.from_rotvec(plain.x) * start).as_matrix(), rtol=0.0, atol=1e-6)
+    np.testing.assert_allclose(found.T @ found, np.eye(3), rtol=0.0, atol=1e-12)
+    assert cost == pytest.approx(2.0 * plain.cost, rel=1e-8)

@@ -6,6 +6,8 @@ run makes a plan; keys under "# part of a campaign" are tried in one. Of a shell
 `text` is not for running.
 """
 
+import contextlib
+import io
 import re
 import shlex
 import subprocess
@@ -15,6 +17,7 @@ import textwrap
 import pandas as pd
 import pytest
 
+from rrru import cli
 from tests.places import ROOT
 from tests.studies.printers.simulated_printers import ENTRIES
 from tests.studies.printers.test_klipper import config
@@ -46,6 +49,17 @@ def _readers_folder(folder, results):
     (folder / "printer.cfg").write_text(config(ENTRIES["printer_22"]))
 
 
+def _command(arguments, folder):
+    """Exit code and output of `rrru` in a folder, within this process."""
+    output = io.StringIO()
+    with contextlib.chdir(folder), contextlib.redirect_stdout(output), contextlib.redirect_stderr(output):
+        try:
+            code = cli.main(arguments)
+        except SystemExit as stopped:
+            code = stopped.code
+    return code or 0, output.getvalue()
+
+
 def _shell(line, folder):
     """Exit code and output of a line, run dry."""
     words = shlex.split(line, comments=True)
@@ -58,9 +72,7 @@ def _shell(line, folder):
         arguments = ["printer", *words[1:]] if words[0] == "rrru-printer" else words[1:]
         # a diagnosis takes its time: what it would read is read
         arguments = ["check", *arguments[1:]] if arguments[0] == "diagnose" else arguments
-        program = [sys.executable, "-m", "rrru.cli", *arguments]
-        finished = subprocess.run(program, cwd=folder, capture_output=True, text=True, check=False)
-        return finished.returncode, finished.stdout + finished.stderr
+        return _command(arguments, folder)
     assert words[0] == "snakemake" and words[1] in ("--cores", "--profile"), f"no way to try {line!r}"
     arguments = words[3:] if words[1] == "--cores" else words[1:]
     split = arguments.index("--configfile") if "--configfile" in arguments else len(arguments)

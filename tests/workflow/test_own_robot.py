@@ -61,7 +61,7 @@ virtual_robots:
   own_twin: {{errors: {{{error}: {size}}}, effects: {{backlash: {play}}}, platform_mass_kg: 1.0}}
 trajectories:
   small:
-    lines: {{start_mm: {start}, end_mm: {end}, offsets_y_mm: [0.0, 25.0, -25.0], points: 25}}
+    lines: {{start_mm: {start}, end_mm: {end}, offsets_y_mm: [0.0, 25.0, -25.0], points: 15}}
 campaigns:
   own:
     {{robot: mine, virtual: own_twin, trajectories: small, noise_mm: 0.01, errors: {errors},{reads}
@@ -132,7 +132,7 @@ def test_an_arm_from_a_urdf_file_goes_the_whole_way(tmp_path):
         reads=" noise_rad: 1.0e-4, targets: {ball: [20.0, 0.0, 60.0], nest: [-30.0, 10.0, 50.0]},",
     )
     measured = result["measurements"]
-    assert len(measured) == 2 * 2 * 3 * 25 and set(measured["target"]) == {"ball", "nest"}
+    assert len(measured) == 2 * 2 * 3 * 15 and set(measured["target"]) == {"ball", "nest"}
     # where the robot was sent, an orientation is read with its noise alone and the little that the errors turn it by
     off = rows.turns(measured, "measured") @ rows.turns(measured, "command").transpose(0, 2, 1)
     assert 1e-4 < np.sqrt((Rotation.from_matrix(off).magnitude() ** 2).mean()) < 5e-3

@@ -103,7 +103,8 @@ def test_advice_is_followed_and_counted(robot, monkeypatch):
     monkeypatch.setattr(advice, "SURE", 1.1)
     monkeypatch.setattr(advice, "ROUNDS", 2)
     known = MeasuredRobot(make_mechanism("rrru3", {}), CONDITIONS.masses, CONDITIONS.noise_mm, robot.name)
-    library = GapSettings()
+    # few effects: how a diagnosis decides is no matter here
+    library = GapSettings(("backlash", "drive_compliance", "servo_lag", "thermal_growth"), draws=50)
     measurements = robot.measured(CONDITIONS)
     followed = [pd.DataFrame(advice.follow(robot, measurements, CONDITIONS, known, library)) for _ in range(2)]
     pd.testing.assert_frame_equal(*followed)
