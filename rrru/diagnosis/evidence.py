@@ -233,9 +233,9 @@ class ModelEvidence:
         narrow, others = (*terms[:broad], *terms[broad + 1 :]), (*grids[:broad], *grids[broad + 1 :])
         rows = np.array(list(product(*others)))
         problem = self.projected(narrow, levels) if narrow else None
-        values = [self._with_broad_term(terms[broad], scale, problem, rows, levels) for scale in grids[broad]]
-        values = [value.reshape(len(levels), *map(len, others)) for value in values]
-        return np.stack(values, axis=broad + 1).reshape(len(levels), -1), combinations
+        value = self._with_broad_term(terms[broad], grids[broad], problem, rows, levels)
+        value = value.reshape(len(levels), len(grids[broad]), *map(len, others))
+        return np.moveaxis(value, 1, broad + 1).reshape(len(levels), -1), combinations
 
     @_on_complete
     def remaining_columns(self, terms, prior_scales, level):
@@ -267,19 +267,19 @@ class ModelEvidence:
         wide = [count if many else 0 for count, many in zip(counts, broad, strict=True)]
         return int(np.argmax(wide)) if any(wide) else None
 
-    def _with_broad_term(self, broad, prior_scale, problem, prior_scales, levels):
-        """Log evidence (levels, m) of a broad term at a prior scale together with other terms.
+    def _with_broad_term(self, broad, grid, problem, prior_scales, levels):
+        """Log evidence (levels, s, m) of a broad term at the prior scales of a grid (s,) together with other terms.
 
         problem: the others' MarginalProblem at the levels, None where there are none; prior_scales (m, terms): theirs.
         """
-        averages = [self._average(broad, prior_scale, level) for level in levels]
-        value = np.array([self._whitened.gram(k)[2] + a.evidence for k, a in zip(levels, averages, strict=True)])[
-            :, None
-        ]
+        averages = [self._average(broad, prior_scale, level) for level in levels for prior_scale in grid]
+        none = np.array([self._whitened.gram(level)[2] for level in levels])
+        alone = none[:, None, None] + np.array([a.evidence for a in averages]).reshape(len(levels), -1, 1)
         if problem is None:
-            return value
+            return alone
         gram, moment = (np.array(part) for part in zip(*(a.rest(problem.index) for a in averages), strict=True))
-        return value + gained_over_cases(problem.on(gram, moment), prior_scales)
+        found = gained_over_cases(problem.on(gram, moment), prior_scales)
+        return alone + found.reshape(*alone.shape[:2], -1)
 
     def _average(self, term, prior_scale, level):
         """The Average over the coefficients of a broad term at a prior scale and a level (an index)."""
