@@ -29,7 +29,7 @@ import numpy as np
 
 from rrru.cache import Latest
 from rrru.diagnosis.evidence_kernels import log_sum_exp
-from rrru.diagnosis.marginal import Average, averaged_mean
+from rrru.diagnosis.marginal import Average
 from rrru.diagnosis.marginal_problem import MarginalProblem, Prior
 from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.payload_nuisance import (
@@ -302,6 +302,11 @@ class ModelEvidence:
         return Latest(OPTIONS.max_cached_results)
 
     @cached_property
+    def _means(self):
+        # the last one: parts of a hypothesis are asked for one after another
+        return Latest(1)
+
+    @cached_property
     def _averages(self):
         return Latest(OPTIONS.max_cached_results)
 
@@ -343,7 +348,9 @@ class ModelEvidence:
         if hypothesis.effects.isdisjoint(effects):
             return 0.0
         level = int(hypothesis.evidence.argmax())
-        mean = self._mean(hypothesis.terms, hypothesis.prior_scales[level], level)
+        prior_scales = hypothesis.prior_scales[level]
+        asked = hypothesis.terms, tuple(prior_scales), level
+        mean = self._means.of(asked, lambda: self._mean(hypothesis.terms, prior_scales, level))
         problem = self.projected(hypothesis.terms, [0])
         chosen = np.array([*(term.effect in effects for term in hypothesis.terms), True])
         mean = np.where(chosen[problem.owner], mean, 0.0)
@@ -355,18 +362,14 @@ class ModelEvidence:
         broad = self._broadest(terms)
         if broad is None:
             return mean_over_cases(self.projected(terms, [level]), np.asarray(prior_scales)[None])
-        narrow, prior = (*terms[:broad], *terms[broad + 1 :]), self._prior(terms[broad])
+        narrow, average = (*terms[:broad], *terms[broad + 1 :]), self._average(terms[broad], prior_scales[broad], level)
         index, found, problem = np.zeros(0, dtype=int), np.zeros(0), None
         if narrow:
             problem = self.projected(narrow, [level])
             index = problem.index
-            problem = problem.on(
-                *(p[None] for p in self._average(terms[broad], prior_scales[broad], level).rest(index))
-            )
+            problem = problem.on(*(part[None] for part in average.rest(index)))
             found = mean_over_cases(problem, np.delete(prior_scales, broad)[None])
-        gram, moment, _ = self._whitened.gram(level)
-        others = found if problem is None else problem.of_columns(found)
-        of_broad = averaged_mean(gram, moment, prior.index, prior.at(prior_scales[broad]), index, others)
+        of_broad = average.mean(index, found if problem is None else problem.of_columns(found))
         before = sum(len(self._prior(term).index) for term in terms[:broad])
         return np.concatenate([found[:before], of_broad, found[before:]])
 

@@ -52,11 +52,10 @@ class Average:
         across = self.across[index]
         return self._gram[index[:, None], index] - across @ across.T, self.moment[index]
 
-
-def averaged_mean(gram, moment, index, size, others, values):
-    """Mean (z,) of the coefficients of columns index (z,) where other columns (k,) have coefficients values (k,)."""
-    target = size * (moment[index] - gram[index[:, None], others] @ values)
-    return size * cho_solve((_factor(gram, index, size), True), target, check_finite=False)
+    def mean(self, others, values):
+        """Mean (z,) of the term's coefficients where other columns (k,) have coefficients values (k,)."""
+        target = self._size * (self._moment[self._index] - self._gram[self._index[:, None], others] @ values)
+        return self._size * cho_solve((self._factor, True), target, check_finite=False)
 
 
 def _factor(gram, index, size):
