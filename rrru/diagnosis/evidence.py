@@ -207,7 +207,7 @@ class ModelEvidence:
     def _grams(self, levels, index):
         """Gram matrices (l, k, k) and moments (l, k) of some columns at levels (indices)."""
         grams = [self._whitened.gram(level) for level in levels]
-        return map(np.array, zip(*((g[index[:, None], index], m[index]) for g, m, _ in grams), strict=True))
+        return map(np.array, zip(*((g.take(index, 0).take(index, 1), m[index]) for g, m, _ in grams), strict=True))
 
     def _by_weight(self, term):
         """Matrix from a term's coefficients to coordinates, and derivatives of its columns by payload and tilt."""

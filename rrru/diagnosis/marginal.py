@@ -50,7 +50,7 @@ class Average:
     def rest(self, index):
         """Gram matrix (k, k) and moments (k,) of some of the other columns after the average."""
         across = self.across[index]
-        return self._gram[index[:, None], index] - across @ across.T, self.moment[index]
+        return self._gram.take(index, 0).take(index, 1) - across @ across.T, self.moment[index]
 
     def mean(self, others, values):
         """Mean (z,) of the term's coefficients where other columns (k,) have coefficients values (k,)."""
@@ -60,4 +60,4 @@ class Average:
 
 def _factor(gram, index, size):
     """Lower Cholesky factor (z, z) of I + diag(size) G diag(size) of some columns."""
-    return np.linalg.cholesky(size[:, None] * gram[index[:, None], index] * size + np.eye(len(size)))
+    return np.linalg.cholesky(size[:, None] * gram.take(index, 0).take(index, 1) * size + np.eye(len(size)))
