@@ -29,7 +29,7 @@ import numpy as np
 
 from rrru.cache import Latest
 from rrru.diagnosis.evidence_kernels import log_sum_exp
-from rrru.diagnosis.marginal import Average, averaged_mean
+from rrru.diagnosis.marginal import Average
 from rrru.diagnosis.marginal_problem import MarginalProblem, Prior
 from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.payload_nuisance import (
@@ -207,7 +207,7 @@ class ModelEvidence:
     def _grams(self, levels, index):
         """Gram matrices (l, k, k) and moments (l, k) of some columns at levels (indices)."""
         grams = [self._whitened.gram(level) for level in levels]
-        return map(np.array, zip(*((g[index[:, None], index], m[index]) for g, m, _ in grams), strict=True))
+        return map(np.array, zip(*((g.take(index, 0).take(index, 1), m[index]) for g, m, _ in grams), strict=True))
 
     def _by_weight(self, term):
         """Matrix from a term's coefficients to coordinates, and derivatives of its columns by payload and tilt."""
@@ -233,9 +233,9 @@ class ModelEvidence:
         narrow, others = (*terms[:broad], *terms[broad + 1 :]), (*grids[:broad], *grids[broad + 1 :])
         rows = np.array(list(product(*others)))
         problem = self.projected(narrow, levels) if narrow else None
-        values = [self._with_broad_term(terms[broad], scale, problem, rows, levels) for scale in grids[broad]]
-        values = [value.reshape(len(levels), *map(len, others)) for value in values]
-        return np.stack(values, axis=broad + 1).reshape(len(levels), -1), combinations
+        value = self._with_broad_term(terms[broad], grids[broad], problem, rows, levels)
+        value = value.reshape(len(levels), len(grids[broad]), *map(len, others))
+        return np.moveaxis(value, 1, broad + 1).reshape(len(levels), -1), combinations
 
     @_on_complete
     def remaining_columns(self, terms, prior_scales, level):
@@ -267,19 +267,19 @@ class ModelEvidence:
         wide = [count if many else 0 for count, many in zip(counts, broad, strict=True)]
         return int(np.argmax(wide)) if any(wide) else None
 
-    def _with_broad_term(self, broad, prior_scale, problem, prior_scales, levels):
-        """Log evidence (levels, m) of a broad term at a prior scale together with other terms.
+    def _with_broad_term(self, broad, grid, problem, prior_scales, levels):
+        """Log evidence (levels, s, m) of a broad term at the prior scales of a grid (s,) together with other terms.
 
         problem: the others' MarginalProblem at the levels, None where there are none; prior_scales (m, terms): theirs.
         """
-        averages = [self._average(broad, prior_scale, level) for level in levels]
-        value = np.array([self._whitened.gram(k)[2] + a.evidence for k, a in zip(levels, averages, strict=True)])[
-            :, None
-        ]
+        averages = [self._average(broad, prior_scale, level) for level in levels for prior_scale in grid]
+        none = np.array([self._whitened.gram(level)[2] for level in levels])
+        alone = none[:, None, None] + np.array([a.evidence for a in averages]).reshape(len(levels), -1, 1)
         if problem is None:
-            return value
+            return alone
         gram, moment = (np.array(part) for part in zip(*(a.rest(problem.index) for a in averages), strict=True))
-        return value + gained_over_cases(problem.on(gram, moment), prior_scales)
+        found = gained_over_cases(problem.on(gram, moment), prior_scales)
+        return alone + found.reshape(*alone.shape[:2], -1)
 
     def _average(self, term, prior_scale, level):
         """The Average over the coefficients of a broad term at a prior scale and a level (an index)."""
@@ -300,6 +300,11 @@ class ModelEvidence:
     @cached_property
     def _found(self):
         return Latest(OPTIONS.max_cached_results)
+
+    @cached_property
+    def _means(self):
+        # the last one: parts of a hypothesis are asked for one after another
+        return Latest(1)
 
     @cached_property
     def _averages(self):
@@ -343,7 +348,9 @@ class ModelEvidence:
         if hypothesis.effects.isdisjoint(effects):
             return 0.0
         level = int(hypothesis.evidence.argmax())
-        mean = self._mean(hypothesis.terms, hypothesis.prior_scales[level], level)
+        prior_scales = hypothesis.prior_scales[level]
+        asked = hypothesis.terms, tuple(prior_scales), level
+        mean = self._means.of(asked, lambda: self._mean(hypothesis.terms, prior_scales, level))
         problem = self.projected(hypothesis.terms, [0])
         chosen = np.array([*(term.effect in effects for term in hypothesis.terms), True])
         mean = np.where(chosen[problem.owner], mean, 0.0)
@@ -355,18 +362,14 @@ class ModelEvidence:
         broad = self._broadest(terms)
         if broad is None:
             return mean_over_cases(self.projected(terms, [level]), np.asarray(prior_scales)[None])
-        narrow, prior = (*terms[:broad], *terms[broad + 1 :]), self._prior(terms[broad])
+        narrow, average = (*terms[:broad], *terms[broad + 1 :]), self._average(terms[broad], prior_scales[broad], level)
         index, found, problem = np.zeros(0, dtype=int), np.zeros(0), None
         if narrow:
             problem = self.projected(narrow, [level])
             index = problem.index
-            problem = problem.on(
-                *(p[None] for p in self._average(terms[broad], prior_scales[broad], level).rest(index))
-            )
+            problem = problem.on(*(part[None] for part in average.rest(index)))
             found = mean_over_cases(problem, np.delete(prior_scales, broad)[None])
-        gram, moment, _ = self._whitened.gram(level)
-        others = found if problem is None else problem.of_columns(found)
-        of_broad = averaged_mean(gram, moment, prior.index, prior.at(prior_scales[broad]), index, others)
+        of_broad = average.mean(index, found if problem is None else problem.of_columns(found))
         before = sum(len(self._prior(term).index) for term in terms[:broad])
         return np.concatenate([found[:before], of_broad, found[before:]])
 

@@ -9,7 +9,6 @@ of s rad resolve orders that differ by 2 pi / s, and none below that.
 from dataclasses import replace
 
 import numpy as np
-from scipy.signal import find_peaks
 
 from rrru.diagnosis.discrepancy_basis import UNKNOWN
 from rrru.diagnosis.options import OPTIONS
@@ -70,7 +69,7 @@ def _found(case, linear, effect, others):
     if len(orders) < 3 or nuisance.shape[-1] > linear.data.size // 2:
         return effect
     gains = periodogram(linear.data, linear.drive[..., drives], drive, nuisance, orders)
-    peaks, _ = find_peaks(gains)
+    peaks = 1 + np.flatnonzero((gains[1:-1] > gains[:-2]) & (gains[1:-1] > gains[2:]))
     shapes = list(coordinates.shapes)
     for peak in peaks[np.argsort(-gains[peaks])][: OPTIONS.max_periodogram_peaks]:
         order = _vertex(orders, gains, peak)

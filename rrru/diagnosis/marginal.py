@@ -50,15 +50,14 @@ class Average:
     def rest(self, index):
         """Gram matrix (k, k) and moments (k,) of some of the other columns after the average."""
         across = self.across[index]
-        return self._gram[index[:, None], index] - across @ across.T, self.moment[index]
+        return self._gram.take(index, 0).take(index, 1) - across @ across.T, self.moment[index]
 
-
-def averaged_mean(gram, moment, index, size, others, values):
-    """Mean (z,) of the coefficients of columns index (z,) where other columns (k,) have coefficients values (k,)."""
-    target = size * (moment[index] - gram[index[:, None], others] @ values)
-    return size * cho_solve((_factor(gram, index, size), True), target, check_finite=False)
+    def mean(self, others, values):
+        """Mean (z,) of the term's coefficients where other columns (k,) have coefficients values (k,)."""
+        target = self._size * (self._moment[self._index] - self._gram[self._index[:, None], others] @ values)
+        return self._size * cho_solve((self._factor, True), target, check_finite=False)
 
 
 def _factor(gram, index, size):
     """Lower Cholesky factor (z, z) of I + diag(size) G diag(size) of some columns."""
-    return np.linalg.cholesky(size[:, None] * gram[index[:, None], index] * size + np.eye(len(size)))
+    return np.linalg.cholesky(size[:, None] * gram.take(index, 0).take(index, 1) * size + np.eye(len(size)))

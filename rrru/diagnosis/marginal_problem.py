@@ -69,9 +69,11 @@ class MarginalProblem:
         if self.mix is None:
             return replace(self, gram=grams, moment=moments)
         f = len(self.index) - len(self.mix)
-        across = grams[:, :f, f:] @ self.mix
-        of_nuisance = self.mix.T @ grams[:, f:, f:] @ self.mix
-        gram = np.block([[grams[:, :f, :f], across], [across.transpose(0, 2, 1), of_nuisance]])
+        gram = np.empty((len(grams), len(self.size), len(self.size)))
+        gram[:, :f, :f] = grams[:, :f, :f]
+        gram[:, :f, f:] = across = grams[:, :f, f:] @ self.mix
+        gram[:, f:, :f] = across.transpose(0, 2, 1)
+        gram[:, f:, f:] = self.mix.T @ grams[:, f:, f:] @ self.mix
         return replace(self, gram=gram, moment=np.concatenate([moments[:, :f], moments[:, f:] @ self.mix], axis=1))
 
     def of_columns(self, coefficients):

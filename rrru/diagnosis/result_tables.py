@@ -4,7 +4,7 @@ from itertools import zip_longest
 
 import numpy as np
 import pandas as pd
-from scipy.stats import t as student_t
+from scipy.special import stdtrit
 
 from rrru.campaign import measurements as rows
 from rrru.diagnosis.detectability import detectability
@@ -85,7 +85,7 @@ def _effect_row(inference, name):
         by_fold = np.array([gained[held_out.fold == k].sum() for k in np.unique(held_out.fold)])
         row["heldout_gain"] = float(by_fold.sum())
         if len(by_fold) > 1:
-            half = float(student_t.ppf(0.975, len(by_fold) - 1) * np.sqrt(len(by_fold)) * by_fold.std(ddof=1))
+            half = float(stdtrit(len(by_fold) - 1, 0.975) * np.sqrt(len(by_fold)) * by_fold.std(ddof=1))
             row |= {"heldout_gain_low": row["heldout_gain"] - half, "heldout_gain_high": row["heldout_gain"] + half}
     return row
 

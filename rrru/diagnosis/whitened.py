@@ -102,14 +102,18 @@ class Whitened:
         (cosines, wave), p, unit = self._together, self.linear.base.shape[-1], self.noise.mean_mm
         own = self.noise.variance(wave, lengths(self.run)) / unit**2
         variance = own + discrepancy_scales(self.noise)[level] ** 2 * spectrum(wave)[:, None]
-        white = (cosines / (unit * np.sqrt(variance))[..., None]).reshape(-1, cosines.shape[-1])
-        if self.linear.base_prior is None:
-            return white, variance, p
-        sd, mean = self.linear.base_prior
-        stated = np.isfinite(sd)
-        prior = np.zeros((p, white.shape[1]))
-        prior[:, :p], prior[:, -1] = np.diag(1.0 / sd), np.where(stated, mean, 0.0) / sd
-        return np.concatenate([white, prior[stated]]), variance, p
+        prior = np.zeros((0, cosines.shape[-1]))
+        if self.linear.base_prior is not None:
+            sd, mean = self.linear.base_prior
+            stated = np.isfinite(sd)
+            prior = np.zeros((p, cosines.shape[-1]))
+            prior[:, :p], prior[:, -1] = np.diag(1.0 / sd), np.where(stated, mean, 0.0) / sd
+            prior = prior[stated]
+        # one array of all readings by all columns, since it is large
+        white = np.empty((variance.size + len(prior), cosines.shape[-1]))
+        np.divide(cosines, (unit * np.sqrt(variance))[..., None], out=white[: variance.size].reshape(cosines.shape))
+        white[variance.size :] = prior
+        return white, variance, p
 
     def gram(self, level):
         """Gram matrix (k, k) of the whitened columns at a level (an index), their moments (k,), log evidence of none.

@@ -13,7 +13,7 @@ from scipy.stats import multivariate_normal, norm
 
 from rrru.diagnosis.evidence import PRIOR_SCALES, ModelEvidence
 from rrru.diagnosis.hypothesis import Hypothesis
-from rrru.diagnosis.marginal import Average, averaged_mean
+from rrru.diagnosis.marginal import Average
 from rrru.diagnosis.state import LinearizedProblem
 from rrru.diagnosis.terms import EffectTerm
 from rrru.diagnosis.whitened import DISCREPANCY_SCALES
@@ -378,7 +378,7 @@ def test_an_average_is_an_integral_over_the_coefficients():
     design = np.concatenate([columns[:, index], np.diag(1.0 / size)])
     target = np.concatenate([data - columns[:, others] @ values, np.zeros(3)])
     expected = np.linalg.lstsq(design, target, rcond=None)[0]
-    found = averaged_mean(columns.T @ columns, columns.T @ data, index, size, others, values)
+    found = Average(columns.T @ columns, columns.T @ data, index, size).mean(others, values)
     np.testing.assert_allclose(found, expected, rtol=1e-8)
 
 
