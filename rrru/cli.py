@@ -230,12 +230,12 @@ def _names(text: str) -> list[str]:
 
 def _diagnose(options: argparse.Namespace) -> int:
     """Read, calibrate and diagnose a campaign; write its results and print the answer."""
-    # modules stay: a garbage collector that looks through them again and again takes a tenth of the time
-    gc.disable()
+    first = "rrru.api" not in sys.modules
     from rrru import api
 
-    gc.freeze()
-    gc.enable()
+    if first:
+        # modules stay: a garbage collector that looks through them again and again takes a tenth of the time
+        gc.freeze()
     config, name = _stated(options)
     if "robot" not in config["campaigns"][name]:
         known = ", ".join(config["robots"])
