@@ -191,7 +191,10 @@ class DiagnosisResult:
 
     @property
     def causes(self) -> pd.DataFrame:
-        """Posterior probability of every effect that may act: table `gap_attribute`."""
+        """Posterior probability of every effect that may act: table `gap_attribute`.
+
+        It is NaN for an effect that was not tested: its `decision` is "not tested", its `note` says why.
+        """
         return self.tables["gap_attribute"]
 
     @property

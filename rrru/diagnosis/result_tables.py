@@ -14,7 +14,7 @@ from rrru.diagnosis.problem import GEOMETRY
 from rrru.diagnosis.shrink import shrink_table
 from rrru.diagnosis.terms import per_leg, sites, spread
 from rrru.diagnosis.variance_by_factor import drive_errors, variance_by_factor
-from rrru.diagnosis.verdict import label
+from rrru.diagnosis.verdict import NOT_TESTED, label
 from rrru.estimation.intervals import QUANTILE_95
 
 # the table has columns for so many drives of either unit, whatever the robot
@@ -43,14 +43,15 @@ def _attribute_rows(inference, verdict):
     posterior, case = inference.posterior, inference.case
     result = [_effect_row(inference, name) for name in case.effects]
     result += [
-        {"effect": name, "probability": 0.0, **_EMPTY, "note": f"not tested: {note}"}
+        {"effect": name, "probability": np.nan, **_EMPTY, "note": f"not tested: {note}"}
         for name, note in case.untestable.items()
     ]
     none, unknown = posterior.sets().get((frozenset(), False), 0.0), posterior.probability_unexplained
     result.append({"effect": "none", "probability": none, **_EMPTY})
     result.append({"effect": "unexplained", "probability": unknown, **_EMPTY})
     rows = pd.DataFrame(result)
-    rows.insert(2, "decision", [verdict.decision(name) for name in rows["effect"]])
+    decisions = [NOT_TESTED if name in case.untestable else verdict.decision(name) for name in rows["effect"]]
+    rows.insert(2, "decision", decisions)
     groups = map(verdict.group_of, rows["effect"])
     rows.insert(3, "group_probability", [group.probability if group else np.nan for group in groups])
     return rows

@@ -8,7 +8,7 @@ import numpy as np
 from rrru.diagnosis.design.run_limits import NO_PAYLOAD, WITHIN_LIMITS
 from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.result_notes import MASSES_UNKNOWN, REPEATABILITY_UNKNOWN
-from rrru.diagnosis.verdict import POSSIBLE
+from rrru.diagnosis.verdict import NOT_TESTED, POSSIBLE
 from rrru.effects.causes import cause_texts
 from rrru.robots.drive_words import DriveWords
 
@@ -66,6 +66,7 @@ def answer(campaign, verdict, tables, drives=_WORDS):
         "undecided": _undecided(verdict["undecided"], drives),
         **_row(verdict, ("points", "dropped_points")),
         "left_out": [_row(row, ("reason", "points")) for row in tables["gap_left_out"].to_dict("records")],
+        "not_tested": _not_tested(tables["gap_attribute"]),
         "notes": [note for note in verdict["notes"].split("; ") if note],
         "no_answer": verdict["no_answer"],
         "corrected_file": _corrected_file(verdict),
@@ -186,6 +187,12 @@ def _group(names, tables, budget):
         # they exclude each other, or nearly so
         "share": sum(shares.get(name, 0.0) for name in names),
     }
+
+
+def _not_tested(causes):
+    """Effects that have no probability, with the reason, from rows of `gap_attribute`."""
+    rows = causes[causes["decision"] == NOT_TESTED].to_dict("records")
+    return [{"name": row["effect"], "reason": row["note"].removeprefix(f"{NOT_TESTED}: ")} for row in rows]
 
 
 def _no_answer(facts):

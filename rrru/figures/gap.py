@@ -27,6 +27,8 @@ _TICKS, _FEW_TICKS = 5, 3
 _NAMED_FROM, _INSIDE_FROM = 0.05, 0.6
 # more runs than this have no room for their trajectories' names, and for all their numbers
 _NAMED_RUNS, _NUMBERED_RUNS = 9, 30
+# decision of rrru.diagnosis.verdict on an effect without a probability
+_NOT_TESTED = "not tested"
 _KINDS = {"held_out": "held-out", "resimulated": "resimulated"}
 # replaces a space at which no line may end
 _JOINT = "\N{NO-BREAK SPACE}"
@@ -178,13 +180,13 @@ def _causes(axes, causes, verdict, words):
     alike = (causes["decision"] == "group").to_numpy()
     value = causes["probability"].to_numpy()
     hatched = {"facecolor": "white", "edgecolor": style.BLUE, "hatch": "/////", "linewidth": 0.6}
-    axes.barh(rows, value, height=0.72, color=np.where(chosen, style.BLUE, "#bbbbbb"))
+    axes.barh(rows, np.nan_to_num(value), height=0.72, color=np.where(chosen, style.BLUE, "#bbbbbb"))
     axes.barh(rows[alike], value[alike], height=0.72, **hatched)
     for row, named, cause in zip(rows, chosen, causes.to_dict("records"), strict=True):
         probability, legs = cause["probability"], _leg(cause["legs"], **words)
         text = _probability(probability) + (f", {legs}" if legs and probability >= _NAMED_FROM else "")
-        if not (cause["apart"] or np.isfinite(cause["log_evidence"])):
-            text = "not tested"
+        if cause["decision"] == _NOT_TESTED:
+            probability, text = 0.0, _NOT_TESTED
         inside = probability >= _INSIDE_FROM
         look = {"ha": "right" if inside else "left", "va": "center", "fontsize": 7.0, "in_layout": False}
         colour = "white" if inside and named and cause["decision"] != "group" else "black"

@@ -73,6 +73,11 @@ def test_the_facts_fit_their_schema_and_are_the_same_bytes_every_time(changes, r
     assert sorted(path.name for path in tmp_path.iterdir()) == ["again", "first"]
 
 
+def test_effects_that_were_not_tested_are_in_the_facts_with_the_reason():
+    reason = "needs time, which the columns do not give"
+    assert answered()["not_tested"] == [{"name": "thermal_growth", "reason": reason}]
+
+
 def test_the_sentences_say_what_acts_how_much_how_sure_and_what_next():
     said = " ".join(answered(runs=(RUN,))["sentences"])
     for words in (
