@@ -16,6 +16,7 @@ from rrru.diagnosis.terms import per_leg, sites, spread
 from rrru.diagnosis.variance_by_factor import drive_errors, variance_by_factor
 from rrru.diagnosis.verdict import NOT_TESTED, label
 from rrru.estimation.intervals import QUANTILE_95
+from rrru.robots.drive_words import drive_words
 
 # the table has columns for so many drives of either unit, whatever the robot
 _LEAST_DRIVES = 3
@@ -115,7 +116,7 @@ def parameter_rows(inference):
     parameters, errors = inference.case.mechanism.parameters, fit.estimate.block_errors(GEOMETRY)
     intervals, places = fit.estimate.intervals, fit.estimate.parameters.places
     result = [
-        ("calibration", parameter.name, parameter.unit, value, error, *interval, held)
+        ("calibration", parameter.name, "", parameter.unit, value, error, *interval, held)
         for parameter, value, error, interval, held in zip(
             parameters,
             fit.state.deviations,
@@ -125,23 +126,41 @@ def parameter_rows(inference):
             strict=True,
         )
     ]
+    words = drive_words(inference.case.mechanism)
     for term in fit.terms:
         effect, (values, errors, ends) = library[term.effect], _effect_values(fit, library, term)
         bound = effect.parameters.at_bound(values) & (errors > 0.0)
         errors = np.where(errors > 0.0, errors, np.nan)
         result += [
-            (term.effect, parameter.name, parameter.unit, value, error, *interval, held)
-            for parameter, value, error, interval, held in zip(
-                effect.parameters, values, errors, ends, bound.tolist(), strict=True
+            (term.effect, parameter.name, place, parameter.unit, value, error, *interval, held)
+            for parameter, place, value, error, interval, held in zip(
+                effect.parameters, places_of(effect, words), values, errors, ends, bound.tolist(), strict=True
             )
         ]
     bounds, nuisance = inference.case.bounds, intervals[places[WEIGHT]] if WEIGHT in places else ()
     result += [
-        (WEIGHT, name, unit, value, error, *interval, value in bounds[name])
+        (WEIGHT, name, "", unit, value, error, *interval, value in bounds[name])
         for (name, unit, value, error), interval in zip(fit.weight, nuisance, strict=True)
     ]
     numbers = ("value", "standard_error", "low_95", "high_95", "at_bound")
-    return pd.DataFrame(result, columns=("effect", "parameter", "unit", *numbers))
+    return pd.DataFrame(result, columns=("effect", "parameter", "place", "unit", *numbers))
+
+
+def places_of(effect, words):
+    """Where each parameter of an effect acts, in words, "" for one that belongs to no single leg.
+
+    words: the robot's DriveWords.
+    """
+    coordinates = effect.coordinates
+    shape = coordinates.shapes[0]
+    rest = coordinates.to_values(np.zeros(len(coordinates)), shape)
+    moved = {
+        leg: coordinates.to_values(np.where(coordinates.legs == leg, coordinates.typical, 0.0), shape) != rest
+        for leg in np.unique(coordinates.legs).tolist()
+        if leg > 0
+    }
+    owners = [[leg for leg, changed in moved.items() if changed[k]] for k in range(len(rest))]
+    return [words.place(legs[0]) if len(legs) == 1 else "" for legs in owners]
 
 
 def value_steps(fit, library, term):

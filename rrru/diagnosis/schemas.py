@@ -190,6 +190,7 @@ and, where one of them is compliant, the errors of payload and tilt (effect: wei
 --
 campaign effect
 parameter              str    name of the parameter
+place                  str    the drive or leg of a parameter that each of several has, in words; empty for others
 unit                   str    unit of the value
 value                  float  fitted value
 standard_error         float? 1 sigma, correlated among them; null at a bound and for what was not fitted

@@ -27,6 +27,8 @@ _TICKS, _FEW_TICKS = 5, 3
 _NAMED_FROM, _INSIDE_FROM = 0.05, 0.6
 # more runs than this have no room for their trajectories' names, and for all their numbers
 _NAMED_RUNS, _NUMBERED_RUNS = 9, 30
+# width of the 95 % interval of a share from which the headline has no number, as in rrru.diagnosis.options
+_UNDETERMINED = 0.9
 # decision of rrru.diagnosis.verdict on an effect without a probability
 _NOT_TESTED = "not tested"
 _KINDS = {"held_out": "held-out", "resimulated": "resimulated"}
@@ -276,6 +278,8 @@ def _share(row, words=""):
     shares = [row[f"share_closed{end}"] for end in ("", "_low", "_high")]
     if not np.isfinite(shares[0]):
         return "–"
+    if words and min(shares[2], 1.0) - max(shares[1], 0.0) >= _UNDETERMINED:
+        return "explained fraction not determined"
     value, low, high = (f"{100.0 * share:.0f}".replace("-", "\N{MINUS SIGN}") for share in shares)
     if not np.isfinite(shares).all():
         return f"{value} %{words}"
