@@ -30,7 +30,7 @@ from rrru.calibration.calibrate import Calibration
 from rrru.diagnosis.diagnose import STEPS
 from rrru.diagnosis.diagnose import Diagnosis as CoreDiagnosis
 from rrru.diagnosis.verdict_text import NOT_CORRECTED
-from rrru.errors import ConfigError, IngestError, RrruError
+from rrru.errors import ConfigError, IngestError, RrruError, not_a_file
 from rrru.figures.drawing import draw, draw_all
 from rrru.kinematics.robot import Robot
 from rrru.pipeline import config as parts
@@ -191,7 +191,10 @@ class DiagnosisResult:
 
     @property
     def causes(self) -> pd.DataFrame:
-        """Posterior probability of every effect that may act: table `gap_attribute`."""
+        """Posterior probability of every effect that may act: table `gap_attribute`.
+
+        It is NaN for an effect that was not tested: its `decision` is "not tested", its `note` says why.
+        """
         return self.tables["gap_attribute"]
 
     @property
@@ -511,9 +514,9 @@ def _entry(source: str | Path | Mapping[str, Any], name: str | None) -> tuple[st
         if name not in (None, str(source)):
             raise ConfigError(f"robot {source}: name is {name!r}; allowed: its own, robots of the package keep theirs")
         return str(source), known[str(source)]
-    if not path.is_file():
+    if why := not_a_file(path):
         allowed = f"a URDF, MJCF or YAML file, or {', '.join(known)}"
-        raise ConfigError(f"robot {str(source)!r}: there is no such file; allowed: {allowed}")
+        raise ConfigError(f"robot {str(source)!r}: {why}; allowed: {allowed}")
     if path.suffix.lower() in (".yaml", ".yml"):
         described = {key: one for key, one in read_config([path])["robots"].items() if key not in known or key == name}
         chosen = name or (next(iter(described)) if len(described) == 1 else None)

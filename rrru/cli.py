@@ -18,7 +18,7 @@ from typing import Any, NoReturn
 import yaml
 
 from rrru import __version__
-from rrru.errors import ConfigError, FitError, IngestError, RrruError, SimulationError, UnreachableError
+from rrru.errors import ConfigError, FitError, IngestError, RrruError, SimulationError, UnreachableError, not_a_file
 
 DONE, REFUSED, WRONG, FAILED = range(4)
 INTERRUPTED = 130
@@ -153,9 +153,11 @@ def _stated(options: argparse.Namespace) -> tuple[dict[str, Any], str]:
 
     config = read_config(options.config)
     name, section = options.file, config["campaigns"].get(options.file)
-    if section is None and not Path(options.file).is_file():
+    if section is None and (why := not_a_file(options.file)):
         allowed = "a file of measurements, or a campaign of --config"
-        raise ConfigError(f"{options.file}: there is no such file; allowed: {allowed}")
+        raise ConfigError(f"{options.file}: {why}; allowed: {allowed}")
+    if options.commands is not None and (why := not_a_file(options.commands)):
+        raise ConfigError(f"--commands {options.commands}: {why}; allowed: a file with the commanded positions")
     if section is None:
         name, section = options.name or as_name(Path(options.file).stem), {"ingest": options.file}
     config, robot = _with_robot(options, config)

@@ -1,6 +1,7 @@
 """Errors for the user; each message states what is wrong, where, the value and what is allowed."""
 
 from collections.abc import Iterable
+from pathlib import Path
 
 
 class RrruError(Exception):
@@ -46,6 +47,28 @@ class TableError(RrruError):
 
 class WriteError(RrruError):
     """A file of results cannot be written."""
+
+
+def why_unreadable(error: Exception) -> str:
+    """Why a text file could not be read, in words, from the error of reading it."""
+    for kind, words in _UNREADABLE.items():
+        if isinstance(error, kind):
+            return words
+    return " ".join(str(error).split())
+
+
+def not_a_file(path: str | Path) -> str:
+    """Why a path is no file, in words, "" where it is one."""
+    path = Path(path)
+    return "" if path.is_file() else "is a folder" if path.is_dir() else _UNREADABLE[FileNotFoundError]
+
+
+_UNREADABLE = {
+    FileNotFoundError: "there is no such file",
+    IsADirectoryError: "is a folder",
+    PermissionError: "may not be read",
+    UnicodeDecodeError: "is no text in UTF-8",
+}
 
 
 def _problem_text(problem: dict) -> str:

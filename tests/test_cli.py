@@ -78,7 +78,17 @@ def test_robots_and_effects_are_listed(capsys):
         (("check", "paper", "--config", "config.yaml"), cli.WRONG, "virtual one"),
         (("compare", "nothing", "nobody"), cli.WRONG, "'nothing' is no folder"),
         (("printer", "nothere.cfg"), cli.REFUSED, "nothere.cfg"),
-        (("robots", "--config", "nothere.yaml"), cli.WRONG, "nothere.yaml"),
+        (
+            ("robots", "--config", "nothere.yaml"),
+            cli.WRONG,
+            "nothere.yaml: there is no such file; allowed: a YAML",
+        ),
+        (("robots", "--config", "data"), cli.WRONG, "data: is a folder; allowed: a YAML file"),
+        (("robots", "--config", "docs/circle.png"), cli.WRONG, "circle.png: is no text in UTF-8; allowed: a YAML file"),
+        (("check", "data", "--robot", "rrru3"), cli.WRONG, "data: is a folder; allowed: a file of measurements"),
+        (("diagnose", "data/field_12.csv", "--robot", "data"), cli.WRONG, "robot 'data': is a folder"),
+        (("check", "data/field_12.csv", "--robot", "rrru3", "--commands", "no.csv"), cli.WRONG, "no.csv: there is no"),
+        (("diagnose", "data/field_12.csv", "--robot", "rrru3", "--commands", "data"), cli.WRONG, "data: is a folder"),
         (("effects", "--robot", "nobody"), cli.WRONG, "robot 'nobody'"),
     ],
 )

@@ -222,6 +222,8 @@ class DiagnosisOptions:
     min_compliance_ratio: float = 1e-3
     # a share of the gap that is worth a sentence; assumed
     min_mentioned_share: float = 0.05
+    # a share whose 95 % interval covers this part of 0 to 1 is not determined: the sentence gives no number; assumed
+    max_share_interval: float = 0.9
     # a cause of a smaller share of the gap, or of a smaller size over the noise, is in the table only; assumed
     min_cause_share: float = 0.01
     min_cause_per_noise: float = 0.3

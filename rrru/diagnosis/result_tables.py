@@ -14,8 +14,9 @@ from rrru.diagnosis.problem import GEOMETRY
 from rrru.diagnosis.shrink import shrink_table
 from rrru.diagnosis.terms import per_leg, sites, spread
 from rrru.diagnosis.variance_by_factor import drive_errors, variance_by_factor
-from rrru.diagnosis.verdict import label
+from rrru.diagnosis.verdict import NOT_TESTED, label
 from rrru.estimation.intervals import QUANTILE_95
+from rrru.robots.drive_words import drive_words
 
 # the table has columns for so many drives of either unit, whatever the robot
 _LEAST_DRIVES = 3
@@ -43,14 +44,15 @@ def _attribute_rows(inference, verdict):
     posterior, case = inference.posterior, inference.case
     result = [_effect_row(inference, name) for name in case.effects]
     result += [
-        {"effect": name, "probability": 0.0, **_EMPTY, "note": f"not tested: {note}"}
+        {"effect": name, "probability": np.nan, **_EMPTY, "note": f"not tested: {note}"}
         for name, note in case.untestable.items()
     ]
     none, unknown = posterior.sets().get((frozenset(), False), 0.0), posterior.probability_unexplained
     result.append({"effect": "none", "probability": none, **_EMPTY})
     result.append({"effect": "unexplained", "probability": unknown, **_EMPTY})
     rows = pd.DataFrame(result)
-    rows.insert(2, "decision", [verdict.decision(name) for name in rows["effect"]])
+    decisions = [NOT_TESTED if name in case.untestable else verdict.decision(name) for name in rows["effect"]]
+    rows.insert(2, "decision", decisions)
     groups = map(verdict.group_of, rows["effect"])
     rows.insert(3, "group_probability", [group.probability if group else np.nan for group in groups])
     return rows
@@ -114,7 +116,7 @@ def parameter_rows(inference):
     parameters, errors = inference.case.mechanism.parameters, fit.estimate.block_errors(GEOMETRY)
     intervals, places = fit.estimate.intervals, fit.estimate.parameters.places
     result = [
-        ("calibration", parameter.name, parameter.unit, value, error, *interval, held)
+        ("calibration", parameter.name, "", parameter.unit, value, error, *interval, held)
         for parameter, value, error, interval, held in zip(
             parameters,
             fit.state.deviations,
@@ -124,23 +126,41 @@ def parameter_rows(inference):
             strict=True,
         )
     ]
+    words = drive_words(inference.case.mechanism)
     for term in fit.terms:
         effect, (values, errors, ends) = library[term.effect], _effect_values(fit, library, term)
         bound = effect.parameters.at_bound(values) & (errors > 0.0)
         errors = np.where(errors > 0.0, errors, np.nan)
         result += [
-            (term.effect, parameter.name, parameter.unit, value, error, *interval, held)
-            for parameter, value, error, interval, held in zip(
-                effect.parameters, values, errors, ends, bound.tolist(), strict=True
+            (term.effect, parameter.name, place, parameter.unit, value, error, *interval, held)
+            for parameter, place, value, error, interval, held in zip(
+                effect.parameters, places_of(effect, words), values, errors, ends, bound.tolist(), strict=True
             )
         ]
     bounds, nuisance = inference.case.bounds, intervals[places[WEIGHT]] if WEIGHT in places else ()
     result += [
-        (WEIGHT, name, unit, value, error, *interval, value in bounds[name])
+        (WEIGHT, name, "", unit, value, error, *interval, value in bounds[name])
         for (name, unit, value, error), interval in zip(fit.weight, nuisance, strict=True)
     ]
     numbers = ("value", "standard_error", "low_95", "high_95", "at_bound")
-    return pd.DataFrame(result, columns=("effect", "parameter", "unit", *numbers))
+    return pd.DataFrame(result, columns=("effect", "parameter", "place", "unit", *numbers))
+
+
+def places_of(effect, words):
+    """Where each parameter of an effect acts, in words, "" for one that belongs to no single leg.
+
+    words: the robot's DriveWords.
+    """
+    coordinates = effect.coordinates
+    shape = coordinates.shapes[0]
+    rest = coordinates.to_values(np.zeros(len(coordinates)), shape)
+    moved = {
+        leg: coordinates.to_values(np.where(coordinates.legs == leg, coordinates.typical, 0.0), shape) != rest
+        for leg in np.unique(coordinates.legs).tolist()
+        if leg > 0
+    }
+    owners = [[leg for leg, changed in moved.items() if changed[k]] for k in range(len(rest))]
+    return [words.place(legs[0]) if len(legs) == 1 else "" for legs in owners]
 
 
 def value_steps(fit, library, term):

@@ -119,13 +119,15 @@ imitated_share         float? largest share of its visible gap that one other ef
 note                   str    why it cannot be tested or separated; empty where it can
 
 ## gap_attribute | tables/gap_attribute.parquet | campaign effect
-Posterior probability of each effect as a cause of the gap, none and unexplained included.
+Posterior probability of each effect as a cause of the gap, none and unexplained included. An effect that was not tested
+has none: these data say nothing about it.
 --
 campaign
 effect                 str    name in the library or of the user's, none or unexplained
-probability            float  that it is at work, 0 to 1; several may be at once
+probability            float? that it is at work, 0 to 1; several may be at once; null where it was not tested
 decision               str    named: from a probability of 0.7 on; group: one of several confounded ones, of which
-    one acts as probably; possible: above 0.05; excluded {named, group, possible, excluded}
+    one acts as probably; possible: above 0.05; excluded; not tested: the reason is in note {named, group, possible,
+    excluded, not tested}
 group_probability      float? that one of its group is at work; null where it is in none
 legs                   str    on each leg its own value, one value on all (same), or the one leg; empty where legs
     make no difference
@@ -133,7 +135,7 @@ log_evidence           float? of the best hypothesis with this effect over none,
 heldout_gain           float? log predictive score gained at left-out points by adding it to the calibration
 heldout_gain_low       float? lower end, 95 %, from the folds; null where there is one
 heldout_gain_high      float? upper end, 95 %
-note                   str    empty where there is nothing to say
+note                   str    why the effect was not tested; empty where there is nothing to say
 
 ## gap_remainder | tables/gap_remainder.parquet | campaign follows
 What the unexplained part of a gap looks like: how well a function of one variable predicts it. None where nothing is
@@ -188,6 +190,7 @@ and, where one of them is compliant, the errors of payload and tilt (effect: wei
 --
 campaign effect
 parameter              str    name of the parameter
+place                  str    the drive or leg of a parameter that each of several has, in words; empty for others
 unit                   str    unit of the value
 value                  float  fitted value
 standard_error         float? 1 sigma, correlated among them; null at a bound and for what was not fitted

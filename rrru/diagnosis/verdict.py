@@ -17,7 +17,7 @@ from rrru.diagnosis.terms import per_leg
 
 _NONE = (frozenset(), False)
 # decisions on a cause, as the tables have them
-NAMED, GROUPED, POSSIBLE, EXCLUDED = "named", "group", "possible", "excluded"
+NAMED, GROUPED, POSSIBLE, EXCLUDED, NOT_TESTED = "named", "group", "possible", "excluded", "not tested"
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,7 @@ class Verdict:
         return next((group for group in self.groups if name in group.names), None)
 
     def decision(self, name):
-        """The decision on a cause: NAMED, GROUPED, POSSIBLE or EXCLUDED.
+        """The decision on a tested cause: NAMED, GROUPED, POSSIBLE or EXCLUDED.
 
         Causes of the most probable answer where none is probable enough for a name are POSSIBLE.
         """

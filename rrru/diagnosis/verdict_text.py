@@ -8,7 +8,7 @@ import numpy as np
 from rrru.diagnosis.design.run_limits import NO_PAYLOAD, WITHIN_LIMITS
 from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.result_notes import MASSES_UNKNOWN, REPEATABILITY_UNKNOWN
-from rrru.diagnosis.verdict import POSSIBLE
+from rrru.diagnosis.verdict import NOT_TESTED, POSSIBLE
 from rrru.effects.causes import cause_texts
 from rrru.robots.drive_words import DriveWords
 
@@ -17,7 +17,7 @@ _VERDICT = ("gap_rms_mm", "gap_after_rms_mm", "share_closed", "share_closed_low"
 _NOISE = ("noise_stated_mm", "noise_correlation", "noise_runs_mm", "noise_from")
 _PART = ("part", "kind", "rms_mm", "share", "share_low", "share_high", "probability")
 _WORST = ("name", "unit", "drive_value", "error", "low_95", "high_95")
-_NUMBER = ("parameter", "unit", "value", "standard_error", "low_95", "high_95", "at_bound")
+_NUMBER = ("parameter", "place", "unit", "value", "standard_error", "low_95", "high_95", "at_bound")
 _FOLLOWS = ("follows", "explained", "scale", "unit", "rms_mm")
 _RUN = ("run", "kind", "trajectory", "reverse", "speed_mm_s", "payload_kg", "points", "separates", "gain_nats")
 _APART = ("none", "unexplained")
@@ -66,6 +66,7 @@ def answer(campaign, verdict, tables, drives=_WORDS):
         "undecided": _undecided(verdict["undecided"], drives),
         **_row(verdict, ("points", "dropped_points")),
         "left_out": [_row(row, ("reason", "points")) for row in tables["gap_left_out"].to_dict("records")],
+        "not_tested": _not_tested(tables["gap_attribute"]),
         "notes": [note for note in verdict["notes"].split("; ") if note],
         "no_answer": verdict["no_answer"],
         "corrected_file": _corrected_file(verdict),
@@ -80,10 +81,21 @@ def _corrected_file(verdict):
         return None
     return {
         **{key: verdict[f"file_{key}"] if known else None for key in ("error_mm", "error_fresh_mm")},
+        "expected_mm": expected_mm(verdict) if known else None,
         "remainder": verdict["file_remainder"],
         "headline": verdict["file_headline"],
         "not_in_model": [one for one in verdict["not_in_model"].split("; ") if one],
     }
+
+
+def expected_mm(verdict):
+    """Error in mm to expect of a corrected file's robot at poses and loads like those measured.
+
+    Its distance from the diagnosed robot and the error of that one at held-out points are independent: squares add.
+    verdict: the row of `gap_verdicts`.
+    """
+    distances = [verdict[key] for key in ("file_error_mm", "file_error_fresh_mm")]
+    return float(np.hypot(np.fmax(*distances), verdict["gap_after_rms_mm"]))
 
 
 def sentences(facts):
@@ -140,8 +152,16 @@ def small_percent(share):
 
 
 def share_with_interval(part, follow=""):
-    """The share of a part of the budget, or of an effect, with its 95 % interval."""
+    """The share of a part of the budget, or of an effect, with its 95 % interval; no number where that says nothing."""
+    if not is_determined(part):
+        return f"an undetermined share{follow}"
     return f"{percent(part['share'])}{follow} (95 %: {percent(part['share_low'])} to {percent(part['share_high'])})"
+
+
+def is_determined(part):
+    """Whether the 95 % interval of a share covers so little of 0 to 1 that the share says something."""
+    low, high = (min(max(part[end], 0.0), 1.0) for end in ("share_low", "share_high"))
+    return not high - low >= OPTIONS.max_share_interval
 
 
 def _row(values, names):
@@ -168,11 +188,17 @@ def _effect(name, tables, budget, drives):
         "probability": _clipped(cause["probability"]),
         "decision": cause["decision"],
         "legs": legs,
-        "place": drives.place(*leg) if leg else "",
+        "place": drives.place(*leg) if leg else _places(numbers),
         **{key: share.get(key) for key in ("rms_mm", "share", "share_low", "share_high")},
         "parameters": [_row(number, _NUMBER) for number in numbers],
         "worst_places": [_row(place, _WORST) for place in places.to_dict("records")],
     }
+
+
+def _places(numbers):
+    """Where an effect acts whose parameters, rows of `gap_parameters`, each belong to one of several legs or drives."""
+    places = [place.partition(" ") for place in dict.fromkeys(number["place"] for number in numbers) if place]
+    return f"{places[0][0]} {', '.join(name for _, _, name in places)}" if places else ""
 
 
 def _group(names, tables, budget):
@@ -186,6 +212,12 @@ def _group(names, tables, budget):
         # they exclude each other, or nearly so
         "share": sum(shares.get(name, 0.0) for name in names),
     }
+
+
+def _not_tested(causes):
+    """Effects that have no probability, with the reason, from rows of `gap_attribute`."""
+    rows = causes[causes["decision"] == NOT_TESTED].to_dict("records")
+    return [{"name": row["effect"], "reason": row["note"].removeprefix(f"{NOT_TESTED}: ")} for row in rows]
 
 
 def _no_answer(facts):
@@ -230,7 +262,8 @@ def _causes(facts):
     if facts["unexplained"]:
         share = share_with_interval(next(part for part in facts["budget"] if part["kind"] == "unexplained"))
         if said:
-            said.append(f"Another {share} is systematic and like no effect of the library.")
+            another = f"Another {share.removeprefix('an ')}"
+            said.append(f"{another} is systematic and like no effect of the library.")
         else:
             said.append(
                 f"It is systematic, and no effect of the library explains it: {share} of it is like none of them."
@@ -274,8 +307,13 @@ def _by_share(facts, groups, small):
         if group := groups.get(effect["name"]):
             listed.append((group["share"], " or ".join(map(readable, group["names"]))))
         elif not (small and _is_small(effect, facts)):
-            listed.append((effect["share"] or 0.0, readable(effect["name"])))
-    words = [f"{name} {small_percent(share)}" for share, name in sorted(listed, key=lambda one: (-one[0], one[1]))]
+            known = effect["share"] is None or is_determined(effect)
+            name = readable(effect["name"])
+            listed.append((effect["share"] or 0.0, name if known else f"{name} (share not determined)"))
+    words = [
+        name if name.endswith(")") else f"{name} {small_percent(share)}"
+        for share, name in sorted(listed, key=lambda one: (-one[0], one[1]))
+    ]
     words += [f"{small} small one{'s' if small > 1 else ''}"] * bool(small)
     return f"Causes by their share of the gap: {', '.join(words)}."
 
@@ -312,8 +350,10 @@ def _cause(effect, follow, with_shares, facts):
     """One effect: its share, or its size where shares are not determined, name, leg, sizes and meaning."""
     share = "Also there is"
     if effect["share"] is not None:
-        share = f"{share_with_interval(effect, follow)} is" if with_shares else f"{rounded(effect['rms_mm'])} mm is"
-    place = f" {effect['place']}" if effect["place"] else ""
+        share = f"{_initial(share_with_interval(effect, follow))} is"
+        share = share if with_shares else f"{rounded(effect['rms_mm'])} mm is"
+    # several have their numbers in the table
+    place = f" {effect['place']}" if effect["legs"].isdigit() else ""
     parameters = effect["parameters"]
     per_load = [number for number in parameters if _per_load(number["unit"])]
     massless = MASSES_UNKNOWN in facts["notes"] and bool(per_load)
@@ -372,7 +412,7 @@ def _scatter(facts):
         return ["Some of it does not repeat from pass to pass: no model can correct it."]
     # the interval of a sum is not known
     acting = [part for part in parts if part["share"]]
-    size = share_with_interval(acting[0]) if len(acting) == 1 else percent(share)
+    size = _initial(share_with_interval(acting[0])) if len(acting) == 1 else percent(share)
     if unknown:
         return [f"{size} is {_RANDOM}"]
     return [f"{size} does not repeat from pass to pass: no model can correct it."]

@@ -27,6 +27,10 @@ _TICKS, _FEW_TICKS = 5, 3
 _NAMED_FROM, _INSIDE_FROM = 0.05, 0.6
 # more runs than this have no room for their trajectories' names, and for all their numbers
 _NAMED_RUNS, _NUMBERED_RUNS = 9, 30
+# width of the 95 % interval of a share from which the headline has no number, as in rrru.diagnosis.options
+_UNDETERMINED = 0.9
+# decision of rrru.diagnosis.verdict on an effect without a probability
+_NOT_TESTED = "not tested"
 _KINDS = {"held_out": "held-out", "resimulated": "resimulated"}
 # replaces a space at which no line may end
 _JOINT = "\N{NO-BREAK SPACE}"
@@ -178,13 +182,13 @@ def _causes(axes, causes, verdict, words):
     alike = (causes["decision"] == "group").to_numpy()
     value = causes["probability"].to_numpy()
     hatched = {"facecolor": "white", "edgecolor": style.BLUE, "hatch": "/////", "linewidth": 0.6}
-    axes.barh(rows, value, height=0.72, color=np.where(chosen, style.BLUE, "#bbbbbb"))
+    axes.barh(rows, np.nan_to_num(value), height=0.72, color=np.where(chosen, style.BLUE, "#bbbbbb"))
     axes.barh(rows[alike], value[alike], height=0.72, **hatched)
     for row, named, cause in zip(rows, chosen, causes.to_dict("records"), strict=True):
         probability, legs = cause["probability"], _leg(cause["legs"], **words)
         text = _probability(probability) + (f", {legs}" if legs and probability >= _NAMED_FROM else "")
-        if not (cause["apart"] or np.isfinite(cause["log_evidence"])):
-            text = "not tested"
+        if cause["decision"] == _NOT_TESTED:
+            probability, text = 0.0, _NOT_TESTED
         inside = probability >= _INSIDE_FROM
         look = {"ha": "right" if inside else "left", "va": "center", "fontsize": 7.0, "in_layout": False}
         colour = "white" if inside and named and cause["decision"] != "group" else "black"
@@ -274,6 +278,8 @@ def _share(row, words=""):
     shares = [row[f"share_closed{end}"] for end in ("", "_low", "_high")]
     if not np.isfinite(shares[0]):
         return "–"
+    if words and min(shares[2], 1.0) - max(shares[1], 0.0) >= _UNDETERMINED:
+        return "explained fraction not determined"
     value, low, high = (f"{100.0 * share:.0f}".replace("-", "\N{MINUS SIGN}") for share in shares)
     if not np.isfinite(shares).all():
         return f"{value} %{words}"

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import yaml
 
-from rrru.errors import ConfigError
+from rrru.errors import ConfigError, why_unreadable
 from rrru.pipeline.checks import check_keys, check_schema
 
 DEFAULTS = Path(__file__).with_name("defaults.yaml")
@@ -22,7 +22,7 @@ def read_config(overlays=()):
         try:
             section = yaml.safe_load(Path(file).read_text(encoding="utf-8"))
         except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-            raise ConfigError(f"{file}: {' '.join(str(error).split())}; allowed: a YAML file") from error
+            raise ConfigError(f"{file}: {why_unreadable(error)}; allowed: a YAML file") from error
         if not isinstance(section, dict):
             raise ConfigError(f"{file} holds {type(section).__name__}; allowed: a mapping of sections")
         config = merged(config, section)

@@ -2,7 +2,15 @@
 
 from dataclasses import dataclass
 
-from rrru.diagnosis.verdict_text import NOT_CORRECTED, percent, probability, readable, rounded, share_with_interval
+from rrru.diagnosis.verdict_text import (
+    NOT_CORRECTED,
+    is_determined,
+    percent,
+    probability,
+    readable,
+    rounded,
+    share_with_interval,
+)
 from rrru.report import worth
 
 # colours of the budget's parts: effects in the order of their share, then what is no effect
@@ -102,15 +110,20 @@ def card(facts, source="", found=None, models=(), drives=""):
 
 def _short(facts):
     """The answer in a line: causes with their shares, the probability, and the next run."""
-    named = [(readable(effect["name"]), effect["share"]) for effect in facts["effects"]]
+    named = [(readable(effect["name"]), _known_share(effect)) for effect in facts["effects"]]
     if facts["no_answer"]:
         return f"No cause is named: {facts['no_answer']}."
     if facts["unexplained"]:
-        share = next(part["share"] for part in facts["budget"] if part["kind"] == "unexplained")
+        share = next(_known_share(part) for part in facts["budget"] if part["kind"] == "unexplained")
         named.append(("something unexplained", share))
     causes = ", ".join(words if share is None else f"{words} {percent(share)}" for words, share in named)
     following = f" Next: {facts['next'][0]['run']}." if facts["next"] else ""
     return f"{causes.capitalize() or 'Nothing to add'} (probability {probability(facts['probability'])}).{following}"
+
+
+def _known_share(part):
+    """The share of an effect or of a part of the budget, None where there is none or its interval says nothing."""
+    return part["share"] if part["share"] is not None and is_determined(part) else None
 
 
 def _advice(effects):
@@ -142,7 +155,12 @@ def _file_worth(facts):
     at_measured, at_fresh = (_file_error(file[key]) for key in ("error_mm", "error_fresh_mm"))
     fresh = f"{at_fresh} at 200 fresh ones" if at_fresh else "at the fresh ones it has no pose"
     said = f"It is {at_measured} rms off the diagnosed robot at the measured poses, {fresh}."
-    return [said, *([f"{file['remainder'][0].upper()}{file['remainder'][1:]}."] if file["remainder"] else [])]
+    after, both = (_file_error(size) for size in (facts["gap_after_rms_mm"], file["expected_mm"]))
+    left_out = (
+        f"That leaves out the error of the diagnosed robot itself, {after} at held-out points. With it {both} are to "
+        "be expected at poses and loads like those measured; elsewhere the error may be larger."
+    )
+    return [said, left_out, *([f"{file['remainder'][0].upper()}{file['remainder'][1:]}."] if file["remainder"] else [])]
 
 
 def _file_error(size_mm):
@@ -163,7 +181,7 @@ def _parts(budget):
             _WORDS.get(part["kind"], readable(part["part"])),
             _OTHERS.get(part["kind"], _EFFECTS[number % len(_EFFECTS)]),
             round(100.0 * part["share"] / whole, 2),
-            share_with_interval(part),
+            share_with_interval(part) if is_determined(part) else "share not determined",
         )
         for number, part in enumerate([*effects, *others])
     ]

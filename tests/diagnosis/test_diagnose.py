@@ -184,10 +184,17 @@ def test_columns_that_the_cause_does_not_need_may_be_missing(lagging, column):
 
 
 def test_without_times_a_lag_cannot_be_named_and_the_notes_say_so(lagging):
-    verdict = _checked(diagnosed(lagging.assign(time_s=np.nan), details=True)).verdict
+    found = _checked(diagnosed(lagging.assign(time_s=np.nan), details=True))
+    verdict = found.verdict
     assert "servo_lag" not in verdict["effects"]
     assert "unexplained" in verdict["effects"] + verdict["confusable_with"]
     assert "servo_lag not tested" in verdict["notes"] and "thermal_growth not tested" in verdict["notes"]
+    causes = found.tables["gap_attribute"].set_index("effect")
+    untested = causes.loc[["servo_lag", "thermal_growth"]]
+    assert untested["probability"].isna().all() and set(untested["decision"]) == {"not tested"}
+    assert untested["note"].str.startswith("not tested: needs ").all()
+    tested = causes.drop(index=[name for name in causes.index if f"{name} not tested: " in verdict["notes"]])
+    assert tested["probability"].between(0.0, 1.0 + 1e-9).all() and "not tested" not in set(tested["decision"])
 
 
 def test_points_that_are_not_used_are_reported_where_they_are_many(lagging):

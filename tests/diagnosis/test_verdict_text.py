@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from rrru.diagnosis import verdict_text
 from rrru.diagnosis.result_notes import REPEATABILITY_UNKNOWN
 from rrru.effects.causes import cause_texts
+from rrru.report.cards import card
 from rrru.robots.catalogue import make_mechanism
 from rrru.robots.drive_words import DriveWords, drive_words
 from rrru.store import json_files
@@ -35,12 +36,12 @@ def answered(budget=None, runs=(), drives=_LEGS, places=(), follows=(), causes=N
         "gap_attribute": synthetic_gap.gap_attribute(CAMPAIGN) if causes is None else causes,
         "gap_parameters": pd.DataFrame(
             [
-                ("link_flexure", "flexure2", "mm/N", 0.00123, 0.00011, 0.00101, 0.00145, False),
-                ("backlash", "width1", "rad", 4.04e-4, 0.2e-4, 3.65e-4, 4.43e-4, False),
-                ("backlash", "width2", "rad", 4.04e-4, 0.2e-4, 3.65e-4, 4.43e-4, False),
-                ("backlash", "width3", "rad", 0.0, np.nan, np.nan, np.nan, False),
+                ("link_flexure", "flexure2", "in leg 2", "mm/N", 0.00123, 0.00011, 0.00101, 0.00145, False),
+                ("backlash", "width1", "in leg 1", "rad", 4.04e-4, 0.2e-4, 3.65e-4, 4.43e-4, False),
+                ("backlash", "width2", "in leg 2", "rad", 4.04e-4, 0.2e-4, 3.65e-4, 4.43e-4, False),
+                ("backlash", "width3", "in leg 3", "rad", 0.0, np.nan, np.nan, np.nan, False),
             ],
-            columns=("effect", "parameter", "unit", "value", "standard_error", "low_95", "high_95", "at_bound"),
+            columns=("effect", *verdict_text._NUMBER),
         ),
         "gap_next_runs": pd.DataFrame(list(runs), columns=verdict_text._RUN),
         "gap_drive_functions": pd.DataFrame(list(places), columns=("effect", "worst", *verdict_text._WORST)),
@@ -71,6 +72,47 @@ def test_the_facts_fit_their_schema_and_are_the_same_bytes_every_time(changes, r
     jsonschema.validate(json_files.read(tmp_path / "first"), SCHEMA)
     assert (tmp_path / "first").read_bytes() == (tmp_path / "again").read_bytes()
     assert sorted(path.name for path in tmp_path.iterdir()) == ["again", "first"]
+
+
+def test_effects_that_were_not_tested_are_in_the_facts_with_the_reason():
+    reason = "needs time, which the columns do not give"
+    assert answered()["not_tested"] == [{"name": "thermal_growth", "reason": reason}]
+
+
+def test_a_share_whose_interval_covers_nearly_everything_is_not_determined():
+    """It has no number in sentences and bars; table and facts keep it."""
+    budget = synthetic_gap.gap_budget(CAMPAIGN)
+    wide = budget["part"].isin(["backlash", "unexplained", "scatter"])
+    budget.loc[wide, ["share_low", "share_high"]] = -0.4, 1.7
+    facts = answered(budget=budget, effects="link_flexure+backlash+unexplained")
+    said = " ".join(facts["sentences"])
+    assert "Causes by their share of the gap: link flexure 60 %, backlash (share not determined)." in said
+    assert "60 % of the gap (95 %: 48 % to 78 %) is link flexure" in said
+    assert "An undetermined share is backlash, width1 = width2" in said
+    assert "Another undetermined share is systematic and like no effect of the library." in said
+    assert "An undetermined share does not repeat from pass to pass" in said
+    assert "20 %" not in said and "to 100 %" not in said
+    assert facts["effects"][1]["share"] == pytest.approx(0.2) and facts["effects"][1]["share_high"] == 1.7
+    kinds = {
+        claim.kind for claim in (one for said in facts["sentences"] for one in claims._of_text(said, claims._SENTENCES))
+    }
+    assert "a cause without a share" in kinds and claims.UNKNOWN not in kinds
+    bars = {part.words: part.share for part in card(facts).parts}
+    assert bars["backlash"] == "share not determined" and bars["link flexure"].startswith("60 % (95 %")
+
+
+def test_every_number_of_a_cause_of_several_legs_has_its_place():
+    flexure, backlash = answered()["effects"]
+    assert [number["place"] for number in backlash["parameters"]] == ["in leg 1", "in leg 2", "in leg 3"]
+    assert (flexure["place"], backlash["place"]) == ("in leg 2", "in leg 1, leg 2, leg 3")
+
+
+def test_the_error_to_expect_of_a_corrected_file_holds_what_the_diagnosis_leaves():
+    """Distance of the file from the diagnosis and that of the diagnosis from the robot: squares add."""
+    file = {"file_error_mm": 0.03, "file_error_fresh_mm": 0.04, "gap_after_rms_mm": 0.03}
+    facts = answered(**file)
+    assert facts["corrected_file"]["expected_mm"] == pytest.approx(0.05)
+    assert "0.030 mm at held-out points. With it 0.050 mm are to be expected" in " ".join(card(facts).worth)
 
 
 def test_the_sentences_say_what_acts_how_much_how_sure_and_what_next():

@@ -43,6 +43,14 @@ _NAMED = {
     "temperature_c": ("temperature", "temp", "measurement temperature", "temperatur"),
     "target": ("target", "reflector", "marker", "reflektor"),
 }
+# words before or after an axis in exports of laser trackers, total stations, photogrammetry and CMMs
+_INSTRUMENTS = (
+    *("smr", "reflector", "retroreflector", "rrr", "prism", "ball", "probe", "marker", "sphere", "reflektor", "prisma"),
+    *("lt", "lasertracker", "laser tracker", "tracker", "at", "leica", "faro", "radian", "vantage", "ts", "cmm"),
+    *("meas", "measured", "measurement", "act", "actual", "observed", "obs", "ist", "gemessen", "messwert"),
+)
+# axes of geodesy
+_GEODETIC = {"e": "x", "n": "y", "h": "z", "east": "x", "north": "y", "height": "z", "easting": "x", "northing": "y"}
 # names of drives that are only numbered
 _DRIVES = ("q", "j", "a", "l", "joint", "axis", "achse", "theta", "motor", "leg", "gelenk")
 # columns of whole numbers, which similar names of text columns must not match
@@ -128,7 +136,50 @@ def guess_columns(cells, mechanism, given):
     for likeness, one, theirs in sorted(pairs, key=lambda pair: -pair[0]):
         if likeness >= _LEAST_ALIKE and one not in found and theirs not in found.values():
             found[one] = theirs
+    if not {*MEASURED} & {*given, *found, *cells.means, *cells.names}:
+        found |= _measured_by_an_instrument([name for name in free if name not in found.values()])
     return found | _numbered(mechanism.parts.drives, found, [name for name in free if name not in found.values()])
+
+
+def axis_triples(names):
+    """[{x: .., y: .., z: ..}] of columns whose names differ in the axis alone, of whatever they are."""
+    triples = {}
+    for name in names:
+        words = _plain(name).split()
+        for place in (-1, 0):
+            axis = _GEODETIC.get(words[place], words[place]) if words else ""
+            if axis in ("x", "y", "z"):
+                stem = " ".join(words[:-1] if place else words[1:])
+                triples.setdefault((stem, place), {}).setdefault(axis, name)
+                break
+    return [axes for axes in triples.values() if set(axes) == set("xyz")]
+
+
+def _measured_by_an_instrument(free):
+    """{our name: the file's column} of the one triple of free columns that an instrument may have measured.
+
+    None where several triples may be meant, as of two reflectors in one row: the user has to say which.
+    """
+    triples = {}
+    for name in free:
+        word, axis = _instrument_axis(name)
+        if axis:
+            triples.setdefault(word, {}).setdefault(axis, name)
+    whole = [axes for axes in triples.values() if set(axes) == set("xyz")]
+    return {f"measured_{axis}_mm": whole[0][axis] for axis in "xyz"} if len(whole) == 1 else {}
+
+
+def _instrument_axis(name):
+    """The words of an instrument or of its reflector in a column's name, and its axis; "" and "" for other names."""
+    words = _plain(name).split()
+    for place in (-1, 0):
+        if len(words) > 1:
+            axis = _GEODETIC.get(words[place], words[place])
+            stem = words[:-1] if place else words[1:]
+            bare = re.sub(r"\d+", "", " ".join(stem)).strip()
+            if axis in ("x", "y", "z") and bare in _INSTRUMENTS:
+                return " ".join(stem), axis
+    return "", ""
 
 
 def _numbered(drives, found, free):

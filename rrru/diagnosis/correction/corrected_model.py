@@ -14,7 +14,7 @@ from rrru.diagnosis.correction.file_error import FileModel, file_error
 from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.result_notes import payload_notes
 from rrru.diagnosis.shrink import model_row
-from rrru.diagnosis.verdict_text import NOT_CORRECTED, readable
+from rrru.diagnosis.verdict_text import NOT_CORRECTED, expected_mm, readable
 from rrru.errors import ConfigError, SimulationError, UnreachableError
 from rrru.formats.file_changes import placement_of
 from rrru.kinematics.chain import Poses
@@ -45,10 +45,10 @@ def write_corrected(diagnosis, section, masses, file, seed=0):
         more, why = gap_rows(inference, written, section, file, shrink)
         _refuse_worse(more)
         error = file_error(inference, _model(inference, written, section, file), masses, stream(seed, "fresh poses"))
-        worth = {
-            "file_error_mm": error.measured_mm,
-            "file_error_fresh_mm": error.fresh_mm,
-            "file_remainder": _remainder(shrink, more, written, error, inference),
+        sizes = {"file_error_mm": error.measured_mm, "file_error_fresh_mm": error.fresh_mm}
+        expected = expected_mm(diagnosis.verdict | sizes)
+        worth = sizes | {
+            "file_remainder": _remainder(shrink, more, written, inference, expected),
             "file_headline": _headline(written, error),
         }
         shrink, lost = pd.concat([shrink, more], ignore_index=True), written.not_in_model
@@ -77,18 +77,17 @@ def _refuse_worse(more):
         )
 
 
-def _remainder(shrink, more, written, error, inference):
+def _remainder(shrink, more, written, inference, expected):
     """Residual error of a corrected file beyond that of the diagnosis, in words, empty where negligible.
 
-    written: the Corrected file; error: its FileError; inference: the InferenceResult, whose payload and tilt no file
-    holds, and for whose readings the residual error holds.
+    written: the Corrected file; inference: the InferenceResult, whose payload and tilt no file holds, and for whose
+    readings the residual error holds; expected: that error in mm, of file and diagnosis together.
     """
     of_weight = tuple(payload_notes(inference))
     left, whole = _left_mm(more, "corrected_model"), _left_mm(shrink, "held_out")
     if written.lacking or of_weight:
         names = ", ".join([*map(readable, written.lacking), *(f"that {note}" for note in of_weight)])
-        known = [size for size in (error.measured_mm, error.fresh_mm) if np.isfinite(size)]
-        size = f": {max(known):.2g} mm rms remain {_conditions(inference.case)}" if known else ""
+        size = f": {expected:.2g} mm rms remain {_conditions(inference.case)}" if np.isfinite(expected) else ""
         return f"this {_holds(written)} and not {names}{size}; use corrected_drives"
     if not left > OPTIONS.max_file_remainder_ratio * whole:
         return ""

@@ -10,8 +10,9 @@ import yaml
 
 from rrru.campaign import measurements as rows
 from rrru.campaign.ingest.columns import REQUIRED, resolve
+from rrru.campaign.ingest.guess import axis_triples
 from rrru.campaign.ingest.problems import Problems
-from rrru.campaign.ingest.sheet import COMMAND, position_text
+from rrru.campaign.ingest.sheet import COMMAND, MEASURED, position_text
 from rrru.campaign.ingest.spec import IngestSpec
 from rrru.campaign.stated_motion import STOP_AND_GO
 from rrru.errors import ConfigError, IngestError
@@ -128,6 +129,10 @@ def _used(section, cells, mechanism):
     missing = [ours for ours in REQUIRED if ours not in found and not (drives and ours.startswith("command"))]
     if missing:
         yield f"missing, and needed: {', '.join(missing)}"
+    if set(MEASURED) <= set(missing):
+        for axes in axis_triples(left):
+            pairs = ", ".join(f"measured_{axis}_mm: '{axes[axis]}'" for axis in "xyz")
+            yield f'measured? if {axes["x"]!r} .. are the measured positions: --set "columns={{{pairs}}}"'
     if any(name.startswith("command") for name in missing):
         other = f"the drives' values ({', '.join(mechanism.parts.columns)})"
         yield f"no column has the commanded positions: give a second file with --commands, or {other}"

@@ -44,11 +44,12 @@ _SENTENCES = {
     "the corrected file is worse": r"The corrected file has a residual error of .*",
     "a cause with a share": rf"{_SHARE} is {_CAUSE}",
     "a cause with a size": rf"{_X} mm is {_CAUSE}",
-    "a cause without a share": rf"Also there is {_CAUSE}",
+    "a cause without a share": rf"(?:Also there is|An undetermined share(?: of the gap)? is) {_CAUSE}",
     "shares are not determined": r"The gap is too small relative to the noise: their shares .*",
     "the effects are confounded": r"The effects are confounded with each other: their shares .*",
     "shares overlap": r"These shares add up to more than the gap.*",
-    "something is unexplained": rf"(?:Another|It is systematic, and no effect .*:) (?P<share>{_NUMBER}) % .*",
+    "something is unexplained": rf"(?:Another|It is systematic, and no effect .*:) "
+    rf"(?:(?P<share>{_NUMBER}) %|(?:an )?undetermined share) .*",
     "no cause is sure": r"No cause is probable enough to be named; .*",
     "the unexplained follows": r"The unexplained part follows .*",
     "causes by share": r"Causes by their share of the gap: (?P<listed>.*)\.",
@@ -56,8 +57,8 @@ _SENTENCES = {
     rf"\(probability that one does: {_P}\).*",
     "probability of this answer": rf"(?:Probability that it acts: (?P<each>.*)\. )?Probability of (?:exactly )?this "
     rf"answer: {_P}\.",
-    "it does not repeat": rf"(?:{_SHARE}|Some of it) does not repeat from pass to pass.*",
-    "it is random error": rf"(?:{_SHARE}|Some of it) is random error above the stated noise.*",
+    "it does not repeat": rf"(?:{_SHARE}|An undetermined share|Some of it) does not repeat from pass to pass.*",
+    "it is random error": rf"(?:{_SHARE}|An undetermined share|Some of it) is random error above the stated noise.*",
     "what is left with it": rf"With (?:it|them) in the simulator the residual error at left-out points is {_X} mm; "
     rf"the noise is {_Y} mm\.",
     "these data cannot rule out": r"(?:These data cannot rule out|Parts of the unexplained share could be): "
@@ -161,7 +162,9 @@ def _inside(text, stated):
     for match in re.finditer(rf"(?:^|, )(?P<name>[a-z ]+) {_P}(?=,|$)", stated.get("each", "")):
         result.append(Claim("probability of a cause", text, match.groupdict()))
     if "listed" in stated and "share" in text.split(":")[0]:
-        names = (re.sub(r"( less than)? \d+ %$", "", one) for one in stated["listed"].split(", "))
+        names = (
+            re.sub(r"( less than)? \d+ %$| \(share not determined\)$", "", one) for one in stated["listed"].split(", ")
+        )
         result += [Claim("a cause by its share", text, {"name": name}) for name in names if not name[0].isdigit()]
     if "probability" in stated:
         result.append(Claim("probability", text, stated))
