@@ -3,7 +3,7 @@ PYTHON ?= python3
 CORES ?= 2
 BIN = .venv/bin
 
-.PHONY: results report compare check-data test test-slurm bench lint lock
+.PHONY: results report compare check-data test test-slurm bench docs lint lock
 
 results: .venv/ready
 	@$(BIN)/snakemake --unlock >/dev/null 2>&1 || true
@@ -35,6 +35,10 @@ test-slurm: .venv/ready
 bench: .venv-bench/ready
 	.venv-bench/bin/python -m benchmarks $(GROUPS)
 
+# the site, site/index.html; a broken link ends it (not with --quiet, which takes the warnings away that --strict counts)
+docs: .venv-docs/ready
+	.venv-docs/bin/mkdocs build --strict
+
 lint: .venv/ready
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
@@ -56,8 +60,15 @@ lint: .venv/ready
 	.venv-bench/bin/python -m pip install --quiet --no-deps --no-build-isolation -e .
 	touch $@
 
+# it reads the package's sources and imports none of it
+.venv-docs/ready: docs/requirements.lock
+	$(PYTHON) -m venv .venv-docs
+	.venv-docs/bin/python -m pip install --quiet --require-hashes -r docs/requirements.lock
+	touch $@
+
 # needs uv; run after changing a requirements.in
 COMPILE = uv pip compile --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --no-annotate
 lock:
 	$(COMPILE) requirements.in -o requirements.lock
 	$(COMPILE) benchmarks/requirements.in --override benchmarks/overrides.txt -o benchmarks/requirements.lock
+	$(COMPILE) docs/requirements.in -o docs/requirements.lock

@@ -63,6 +63,12 @@ class RobotModel:
     """A robot of the user's own, or one of the package's. Made by `load_robot`.
 
     name; entry: what describes it, an entry of the configuration's section `robots`.
+
+    >>> robot = load_robot("data/models/arm6.urdf")
+    >>> robot.drives
+    ('axis1_rad', 'axis2_rad', 'axis3_rad', 'axis4_rad', 'axis5_rad', 'axis6_rad')
+    >>> robot.mechanism.forward(np.zeros((1, 6))).round(1)
+    array([[590.,   0., 865.]])
     """
 
     name: str
@@ -92,6 +98,16 @@ class Campaign:
     """Measurements of one robot. Made by `read_campaign`.
 
     name; robot; config: the configuration that it was read with; frames: its tables by name, see results/README.md.
+
+    >>> campaign = read_campaign("data/field_09.csv", load_robot("rrru3"), noise_mm=0.02)
+    >>> campaign
+    Campaign('field_09', 732 readings of rrru3, noise 0.02 mm)
+    >>> float(campaign.measurements["payload_kg"].max())
+    5.0
+    >>> campaign.section
+    {'robot': 'rrru3', 'ingest': 'data/field_09.csv', 'noise_mm': 0.02}
+    >>> campaign.notes
+    ()
     """
 
     name: str
@@ -125,6 +141,16 @@ class CalibrationResult:
 
     campaign; settings: of the calibration; frames: tables by name; fits: {(set, method):
     `rrru.calibration.calibrate.Calibration`}.
+
+    >>> result = calibrate(read_campaign("data/field_09.csv", load_robot("rrru3"), noise_mm=0.02))
+    >>> result
+    CalibrationResult('field_09', rms 0.0477 mm)
+    >>> result.parameters.query("method == 'least_squares'")[["parameter", "value", "standard_error"]].head(2).round(4)
+      parameter   value  standard_error
+    0   dtheta1  0.0026          0.0001
+    1   dtheta2  0.0007          0.0001
+    >>> result.summary["method"].tolist()
+    ['least_squares', 'least_mean_distance']
     """
 
     campaign: Campaign
@@ -169,6 +195,23 @@ class DiagnosisResult:
     """Why a calibrated robot still misses. Made by `diagnose`.
 
     campaign; result: the `rrru.diagnosis.diagnose.Diagnosis` with model and posterior.
+
+    >>> diagnosis = diagnose(read_campaign("data/field_09.csv", load_robot("rrru3"), noise_mm=0.02))
+    >>> diagnosis.causes.query("probability > 0.5")["effect"].tolist()
+    ['thermal_growth']
+    >>> diagnosis.parameters.query("effect == 'thermal_growth'")["parameter"].tolist()
+    ['strain', 'time_constant']
+    >>> diagnosis.budget.query("part == 'thermal_growth'")["share"].round(1).item()
+    1.0
+    >>> diagnosis.next_runs.empty
+    True
+    >>> '"name": "thermal_growth"' in diagnosis.to_json()
+    True
+    >>> len(diagnosis.plot().axes) > 1
+    True
+    >>> diagnosis.write_corrected("mine.urdf")  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    rrru.errors.ConfigError: robot rrru3 has no file that could be corrected; allowed: ...
     """
 
     campaign: Campaign
@@ -580,7 +623,11 @@ def _paths(folder: Path, name: str, config: Mapping[str, Any]) -> dict[str, str]
 
 
 def as_name(text: str) -> str:
-    """A text as a name of the configuration: letters, digits, _ and -."""
+    """A text as a name of the configuration: letters, digits, _ and -.
+
+    >>> as_name("run 1 (cold)")
+    'run_1__cold_'
+    """
     return "".join(sign if sign.isascii() and (sign.isalnum() or sign in "_-") else "_" for sign in text) or "campaign"
 
 

@@ -49,6 +49,8 @@ def test_every_public_function_has_an_example_and_every_example_is_right(monkeyp
     monkeypatch.chdir(ROOT)
     functions = [getattr(rrru, name) for name in rrru.__all__ if name[0].islower()]
     assert len(functions) == 5 and all(">>>" in inspect.getdoc(one) for one in functions)
+    results = [one for one in vars(rrru.api).values() if inspect.isclass(one) and one.__module__ == "rrru.api"]
+    assert len(results) == 4 and all(">>>" in inspect.getdoc(one) for one in results)
     assert doctest.testmod(api).failed == 0
     assert all(inspect.getdoc(getattr(rrru, name)) for name in rrru.__all__ if name[0].isalpha())
 

@@ -3,7 +3,7 @@
 A page's Python runs as one program, next to the results of the workflow's shared run. YAML is an overlay of which a dry
 run makes a plan; keys under "# part of a campaign" are tried in one. Of a shell's lines `snakemake` is run dry, and
 `make` says what it would do. A comment `<!-- file: name -->` before a block is the name that a reader saves it under.
-`text` is not for running.
+`text` and `math` are not for running.
 """
 
 import contextlib
@@ -25,6 +25,8 @@ from tests.workflow.folder import dry_run, link
 
 PAGES = sorted([ROOT / "README.md", *(ROOT / "docs").glob("*.md")])
 _BLOCK = re.compile(r"(?:<!-- file: (\S+) -->\n)?^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+
+_KINDS = ("python", "yaml", "sh", "text", "json", "xml", "math")
 
 
 _PART, _CAMPAIGN = "# part of a campaign\n", "campaigns:\n  my_run:\n    robot: rrru3\n    ingest: my_file.csv\n"
@@ -101,7 +103,9 @@ def test_blocks_of_a_page_do_what_they_say(page, results, tmp_path, monkeypatch)
     _readers_folder(tmp_path, results)
     program = []
     for name, kind, text in blocks(page):
-        assert kind in ("python", "yaml", "sh", "text", "json", "xml"), f"{page.name}: a block of language {kind!r}"
+        assert kind in ("python", "yaml", "sh", "text", "json", "xml", "math"), (
+            f"{page.name}: a block of language {kind!r}"
+        )
         if name:
             (tmp_path / name).write_text(text)
         if kind == "python":
