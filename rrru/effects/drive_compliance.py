@@ -18,8 +18,8 @@ part is confounded with errors of lengths and drives. A second payload separates
 Assumptions: linear spring (harmonic drives stiffen with torque by a factor of about two over their range), no lost
 motion (that is `backlash`), no vibration (a motion slow against the drive's resonance).
 
-Where an arm's file states no masses of its links, the deflection under their weight has parameters of its own beside
-the compliance, which then stands for the payload alone: see `rrru.effects.link_weights`.
+Where an arm's file states no masses of its links, the deflection under their weight has parameters of its own, and the
+compliance is that under the payload: see `rrru.effects.link_weights`.
 
 A joint that a rod or belt makes follow drives deflects under the loads about itself, in addition to what its drives do.
 

@@ -25,7 +25,7 @@ from rrru.parameters import Parameter
 
 _KG_PER_MM, _GRAVITY, _COMPLIANCE = 1.0 / 40.0, 9.81, 2e-8
 _MOST_RAD = 0.02
-# poses at which the components that matter are looked for, and what counts as none beside one
+# poses at which the components that matter are looked for, and the largest size that counts as none
 _POSES, _NONE = 64, 1e-6
 # a link without length, such as a wrist's, has its centre of mass so far off
 _LEAST_MM = 30.0
@@ -35,18 +35,18 @@ _LEAST_MM = 30.0
 class LinkWeights:
     """Parameters of the weight on each drive of an arm.
 
-    joints (K,): number in the leg of each drive's joint; kept: by drive the numbers of its columns, three a link behind
+    joints (K,): number in the leg of each drive's joint; columns: by drive the numbers of its own, three a link behind
     the joint; moments (J,): assumed moments of the links in kg mm.
     """
 
     robot: object
     joints: list
-    kept: list
+    columns: list
     moments: np.ndarray
 
     def parameters(self, drive):
         """Parameters of a drive, counted from 0, and their typical sizes (c,) in rad."""
-        named = [(self.joints[drive] + column // 3, "xyz"[column % 3]) for column in self.kept[drive]]
+        named = [(self.joints[drive] + column // 3, "xyz"[column % 3]) for column in self.columns[drive]]
         parameters = [
             Parameter(
                 f"weight{drive + 1}_link{link + 1}_{axis}", "rad", 0.0, -_MOST_RAD, _MOST_RAD, "assumed", drive + 1
@@ -58,7 +58,7 @@ class LinkWeights:
     def functions(self, motion):
         """By drive the deflections (n, c) under a unit of each of its parameters along a Motion."""
         at = self.robot.map_at(motion.drive, motion.position_mm)
-        return [_columns(self.robot, at, joint)[:, kept] for joint, kept in zip(self.joints, self.kept, strict=True)]
+        return [_columns(self.robot, at, joint)[:, own] for joint, own in zip(self.joints, self.columns, strict=True)]
 
 
 def link_weights(robot):
@@ -74,8 +74,8 @@ def link_weights(robot):
     # anywhere in the ranges, always the same poses
     drives = np.random.default_rng(0).uniform(low, high, (_POSES, len(low)))
     at = robot.map_at(drives, robot.guess(drives))
-    kept = [_independent(_columns(robot, at, joint)) for joint in joints]
-    return LinkWeights(robot, joints, kept, _moments(robot, at))
+    columns = [_independent(_columns(robot, at, joint)) for joint in joints]
+    return LinkWeights(robot, joints, columns, _moments(robot, at))
 
 
 def _frames(robot, at):
