@@ -19,6 +19,7 @@ import yaml
 
 from rrru import __version__
 from rrru.errors import ConfigError, FitError, IngestError, RrruError, SimulationError, UnreachableError, not_a_file
+from rrru.pipeline.option_text import options_in
 
 DONE, REFUSED, WRONG, FAILED = range(4)
 INTERRUPTED = 130
@@ -60,6 +61,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         known = isinstance(error, RrruError)
         said = str(error) if known else f"rrru failed: {type(error).__name__}: {error}; run it again with --debug"
         print(_bold("error: ", sys.stderr) + said, file=sys.stderr)
+        # a user of a configuration writes the key as the message has it
+        if known and hasattr(options, "set") and not options.config and (keys := options_in(said)):
+            print(f"as options of the command: {' '.join(keys)}", file=sys.stderr)
         return FAILED if not known else REFUSED if isinstance(error, _OF_DATA) else WRONG
 
 

@@ -2,10 +2,12 @@
 
 import json
 import re
+import shlex
 import subprocess
 import sys
 from dataclasses import replace
 
+import pandas as pd
 import pytest
 import yaml
 
@@ -154,3 +156,26 @@ def test_a_failure_of_the_program_says_how_to_see_more(monkeypatch, capsys):
     assert code == cli.FAILED and "ZeroDivisionError: in the middle; run it again with --debug" in message
     with pytest.raises(ZeroDivisionError):
         cli.main(["robots", "--debug"])
+
+
+def test_keys_of_a_message_are_options_for_a_user_of_the_command(tmp_path, capsys):
+    """Readings in another frame: the message says which key, and the line below it which option."""
+    frame = pd.read_csv("data/field_12.csv")
+    frame["measured_x_mm"] += 5000.0
+    frame.to_csv(tmp_path / "moved.csv", index=False)
+    code, _, message = ran(capsys, "diagnose", tmp_path / "moved.csv", "--robot", "rrru3", "--out", tmp_path / "out")
+    assert code == cli.REFUSED and "frame: register" in message
+    assert message.splitlines()[-1] == "as options of the command: --frame register"
+
+
+def test_a_proposal_is_a_command_as_well_as_yaml(tmp_path, capsys):
+    frame = pd.read_csv("data/field_12.csv")
+    frame.rename(columns={f"measured_{a}_mm": f"SMR {a.upper()}" for a in "xyz"}).to_csv(
+        tmp_path / "a.csv", index=False
+    )
+    code, out, _ = ran(capsys, "check", tmp_path / "a.csv", "--robot", "rrru3")
+    (command,) = (line for line in out.splitlines() if line.startswith("# or without a file: rrru diagnose "))
+    assert code == cli.DONE and "--robot rrru3" in command
+    words = shlex.split(command.partition("rrru diagnose ")[2])
+    again, out, _ = ran(capsys, "check", *words)
+    assert again == cli.DONE and "used: 'SMR X' as measured_x_mm" in out

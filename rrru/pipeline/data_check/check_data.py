@@ -19,6 +19,7 @@ from rrru.errors import ConfigError, IngestError
 from rrru.pipeline.config import own_robot
 from rrru.pipeline.data_check.costs import costs, enough_poses, without_times
 from rrru.pipeline.data_check.propose import fitting_robots, propose
+from rrru.pipeline.option_text import as_command, options_in
 
 _SHOWN = 8
 # longest line of the overlay
@@ -36,6 +37,14 @@ _UNREADABLE = {
 _BETWEEN = (
     "motion: {kind: stop_and_go, between: drives}  # it moves from stop to stop joint by joint (PTP); "
     "tool: in straight lines (LIN)"
+)
+_WHAT_MOTION_MEANS = (
+    "stop_and_go alone: the side from which a drive came to a stop is known only where PTP and LIN give the same one;",
+    "  backlash and friction_windup, which need that side, are not tested where it is known at too few points",
+    "how to decide: look at the robot's program; moves between the points by PTP or MoveJ: between: drives;",
+    "  by LIN or MoveL: between: tool; by both or unknown: leave it out; measured without a stop: motion: continuous",
+    "as an option: --set 'motion={kind: stop_and_go, between: drives}'",
+    "read_before_rest needs a robot that stops, servo_lag is zero where it does",
 )
 _OPTIONAL = ("time_s", "speed_mm_s", "payload_kg")
 
@@ -169,6 +178,10 @@ def print_check(file, config, robot=None, commands=None, overlays=()):
     if not found.refused:
         files = " ".join([*map(str, overlays), "mine.yaml"])
         print(f"# saved as mine.yaml: rrru diagnose {found.name} --config {files}")
+        if not overlays and (command := as_command(found.section, config["robots"][name])):
+            print(f"# or without a file: {command}")
+    elif not overlays and (options := options_in("\n".join(str(IngestError([one])) for one in found.refused))):
+        print(f"# keys that the problems name, as options of the command: {' '.join(options)}")
     return not found.refused
 
 
@@ -185,5 +198,5 @@ def _pasted(found, robots):
     open_keys = [key for key in _UNREADABLE if key not in found.section and (key != "noise_rad" or found.turned)]
     lines += [f"    # {key}: {_UNREADABLE[key]}" for key in open_keys]
     if found.section.get("motion") == STOP_AND_GO:
-        lines.append(f"    # {_BETWEEN}")
+        lines += [f"    # {_BETWEEN}", *(f"    # {line}" for line in _WHAT_MOTION_MEANS)]
     return "\n".join(lines)
