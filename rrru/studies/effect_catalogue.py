@@ -167,8 +167,8 @@ What the diagnosis can name: {count} effects. `rrru effects --robot ROBOT` lists
 by `python -m rrru.studies.effect_catalogue` from the modules of `rrru/effects/`. A test compares it with them.
 
 - **Equation, assumptions, source** are those of the effect's module. `rrru/effects/<name>.py` has the code.
-- **Prior s.d.** is the typical size: the prior standard deviation of a coefficient. The evidence is averaged over
-  a grid of scales about it ([concepts](concepts.md)).
+- **Prior s.d.** is the typical size of a coefficient. It sets the ratios of an effect's coefficients; the evidence is
+  averaged over a grid of scales of all of them ([concepts](concepts.md#priors)).
 - **The file must hold** says without what the effect is not tested.
 - **The picture** shows what the calibration cannot absorb of the effect. It has one coefficient at its prior s.d.: the
   one that stays largest. x is blue, y orange, z green; readings are in the order driven.
