@@ -131,6 +131,20 @@ def test_one_stated_reflector_needs_no_column(arm):
         rrru.read_campaign(frame, arm, targets={"ball": place, "other": place}, noise_mm=NOISE_MM)
 
 
+def test_a_corrected_file_with_a_reflector_at_its_tip_is_compared_at_the_given_tip(arm, tmp_path):
+    """The link of the reflector is the only last one of the corrected file, which was 72 mm off by that."""
+    generator, place = np.random.default_rng(8), np.array([60.0, 0.0, 40.0])
+    drives = HOME + generator.uniform(-0.6, 0.6, (60, len(HOME)))
+    seen = arm.mechanism.solve(drives, arm.mechanism.forward(drives)).point(place)
+    frame = pd.DataFrame(drives, columns=arm.drives).assign(target="ball")
+    frame[["measured_x_mm", "measured_y_mm", "measured_z_mm"]] = seen + generator.normal(0.0, NOISE_MM, seen.shape)
+    assert "tip" not in arm.entry
+    campaign = rrru.read_campaign(frame, arm, noise_mm=NOISE_MM, errors="zero")
+    written = rrru.diagnose(campaign, effects=["drive_compliance"]).write_corrected(tmp_path / "corrected.urdf")
+    assert "reflector_ball" in (tmp_path / "corrected.urdf").read_text()
+    assert written.not_corrected == "" and written.verdict["corrected_file"]["error_mm"] < NOISE_MM
+
+
 def test_a_zero_that_is_off_is_found_and_the_corrected_file_holds_it(arm, tmp_path):
     """Truth from the arm's kinematics alone: the zero of joint 2 within its interval, the file as good as the noise."""
     generator = np.random.default_rng(4)

@@ -49,6 +49,17 @@ def from_urdf(path, base=None, tip=None, home=None, tips=None, carries=None, **o
     return _robot(*urdf_parts(file, base, tip, home), options)
 
 
+def with_tip(section):
+    """A robot's entry in the configuration with the tip that its URDF has by default; other entries as they are.
+
+    A corrected file may have further links at its tip.
+    """
+    if "urdf" not in section or section.get("tip") or section.get("tips"):
+        return section
+    file = _existing(section["urdf"])
+    return section | {"tip": urdf_files.ends(urdf_files.read(file), section.get("base"), None, file)[1]}
+
+
 def urdf_parts(path, base=None, tip=None, home=None):
     """The Assembly of a URDF's chain, its driven joints as `structure_of` wants them, and what follows them."""
     file = _existing(path)

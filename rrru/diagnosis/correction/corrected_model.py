@@ -17,6 +17,7 @@ from rrru.diagnosis.shrink import model_row
 from rrru.diagnosis.verdict_text import NOT_CORRECTED, expected_mm, readable
 from rrru.errors import ConfigError, SimulationError, UnreachableError
 from rrru.formats.file_changes import placement_of
+from rrru.formats.robot_file import with_tip
 from rrru.kinematics.chain import Poses
 from rrru.kinematics.legs import TOOL, WORLD
 from rrru.robots.catalogue import make_mechanism
@@ -35,7 +36,7 @@ def write_corrected(diagnosis, section, masses, file, seed=0):
     reason in a comment and in `not_in_model`. section: the robot's entry in the configuration; masses: the
     robot's; seed: of the fresh poses at which file and diagnosis are compared.
     """
-    file, inference = Path(file), diagnosis.inference
+    file, inference, section = Path(file), diagnosis.inference, with_tip(section)
     shrink, why, worth = diagnosis.tables["gap_shrink"], "", {}
     try:
         if why_not := diagnosis.verdict["no_answer"]:
