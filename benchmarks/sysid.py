@@ -172,8 +172,8 @@ def by_us(truth, measured, fresh):
     points = fresh[0][["run", "point"]].merge(points[points["model"] == "corrected"], how="left", on=["run", "point"])
     verdict = result.verdict
     answer = f"{verdict['effects']} {verdict['probability']:.2f}"
-    if verdict["confusable_with"]:
-        answer += f" or {verdict['confusable_with']}"
+    if verdict["confounded_with"]:
+        answer += f" or {verdict['confounded_with']}"
     shrink = result.tables["gap_shrink"].query("trajectory == '*'").iloc[-1]
     row = {"by": "rrru", "given": "nothing", "answer": answer, "seconds": seconds, "left_mm": shrink["rms_mm"]}
     return row | counted(truth, numbers), rows.vectors(points, "error")

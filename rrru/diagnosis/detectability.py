@@ -12,7 +12,7 @@ from scipy.special import chdtri, chndtrinc
 from rrru.diagnosis.options import OPTIONS
 
 _HIDDEN = "cannot be separated from the geometric parameters at these poses"
-_NO_RESULT = {"visible_share": np.nan, "detectable_mm": np.nan, "imitated_by": "", "imitated_share": np.nan}
+_NO_RESULT = {"visible_share": np.nan, "detectable_mm": np.nan, "confounded_with": "", "confounded_share": np.nan}
 
 
 def detectability(case, linear):
@@ -73,5 +73,5 @@ def _row(case, name, raw, visible, bases):
     shares = {other: float(((basis.T @ visible) ** 2).sum() / square) for other, basis in others.items()}
     if shares:
         best = max(shares, key=shares.get)
-        row |= {"imitated_by": best, "imitated_share": min(shares[best], 1.0)}
+        row |= {"confounded_with": best, "confounded_share": min(shares[best], 1.0)}
     return row

@@ -207,7 +207,7 @@ def _row(
         "probability": verdict.probability,
         "leg": verdict.leg,
         "where": where(inference, verdict.effects),
-        "confusable_with": ", ".join(verdict.confusable_with),
+        "confounded_with": ", ".join(verdict.confounded_with),
         "groups": "; ".join(" | ".join(group.names) for group in verdict.groups),
         "searches_apart": inference.posterior.apart,
         "noise_rms_mm": float(np.sqrt(3.0) * case.noise_mm),

@@ -22,7 +22,7 @@ probability            float  that exactly these effects act, or that these and 
 leg                    int    the one leg or drive at fault, from 1 on; 0 for all or none
 where                  str    where the effects act, in words: a site, or the first and last of several; empty where
     nothing acts
-confusable_with        str    what else may act, joined by a comma: effects, unexplained and none that are not in the
+confounded_with        str    what else may act, joined by a comma: effects, unexplained and none that are not in the
     verdict and have a probability above 0.05; empty where none
 groups                 str    effects that are confounded in this campaign, of which one acts, the most probable first,
     which is in effects: joined by |, groups by a semicolon; empty where none
@@ -114,8 +114,8 @@ campaign effect
 testable               bool   false where the campaign lacks what the effect needs
 visible_share          float? share of the effect's displacement that the calibration cannot absorb
 detectable_mm          float? gap rms, 3-D, above which this effect alone is found 9 times of 10 at 1 % false alarms
-imitated_by            str    the other effect that it is most confounded with; empty where none
-imitated_share         float? largest share of its visible gap that one other effect can reproduce
+confounded_with            str    the other effect that it is most confounded with; empty where none
+confounded_share         float? largest share of its visible gap that one other effect can reproduce
 note                   str    why it cannot be tested or separated; empty where it can
 
 ## gap_attribute | tables/gap_attribute.parquet | campaign effect

@@ -53,7 +53,7 @@ class Verdict:
         return label(self.effects, self.unexplained)
 
     @property
-    def confusable_with(self):
+    def confounded_with(self):
         """Causes that may act and are not in the answer: the others of its groups, and those that are possible."""
         grouped = [name for group in self.groups for name in group.names[1:]]
         return tuple(name for name in dict.fromkeys([*grouped, *self.possible]) if name not in self.effects)

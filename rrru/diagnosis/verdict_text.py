@@ -55,7 +55,7 @@ def answer(campaign, verdict, tables, drives=_WORDS):
         "probability": _clipped(verdict["probability"]),
         "leg": verdict["leg"] or None,
         "where": verdict["where"],
-        "confusable_with": [name for name in verdict["confusable_with"].split(", ") if name],
+        "confounded_with": [name for name in verdict["confounded_with"].split(", ") if name],
         "groups": [_group(names.split(" | "), tables, budget) for names in verdict["groups"].split("; ") if names],
         "searches_apart": verdict["searches_apart"],
         **_row(verdict, _VERDICT + _NOISE),
@@ -439,7 +439,7 @@ def _open(facts):
     asked = dict.fromkeys(name for sides in contests for name in sorted(set().union(*sides)))
     # groups have a sentence of their own
     grouped = [name for group in facts["groups"] for name in group["names"]]
-    others = dict.fromkeys(name for name in [*facts["confusable_with"], *asked] if name not in [*named, *grouped])
+    others = dict.fromkeys(name for name in [*facts["confounded_with"], *asked] if name not in [*named, *grouped])
     listed = [_OUTSIDE.get(name, readable(name)) for name in others]
     uncertain = {name for sides in contests if not all(sides) for name in set().union(*sides)}
     listed += [f"that {readable(name)} does not act" for name in named if name in uncertain]
@@ -469,7 +469,7 @@ def _next(facts):
     if facts["unexplained"]:
         where = "gap_locate says where the gap is largest"
         return [f"Next: no run is advised, since no effect model fits the unexplained part; {where}."]
-    decided = not (facts["groups"] or facts["confusable_with"])
+    decided = not (facts["groups"] or facts["confounded_with"])
     least = min((effect["probability"] for effect in facts["effects"]), default=facts["probability"])
     if max(least if decided else 0.0, facts["probability"]) >= OPTIONS.min_sure_probability:
         return ["Next: nothing more needs to be measured for this answer."]

@@ -142,8 +142,8 @@ def _headline(verdict, causes, words):
     facts = [f"noise {style.number(verdict['noise_rms_mm'])} mm", f"worst region {place} mm"]
     facts += [f"{verdict['dropped_points']} outliers left out"] if verdict["dropped_points"] else []
     grouped = causes.loc[causes["decision"] == "group", "effect"].tolist()
-    others = [one for one in verdict["confusable_with"].split(", ") if one and one not in grouped]
-    facts += [f"confusable with {_named(', '.join(others))}"] if others else []
+    others = [one for one in verdict["confounded_with"].split(", ") if one and one not in grouped]
+    facts += [f"not ruled out: {_named(', '.join(others))}"] if others else []
     follow = wrap("; ".join(facts), _WIDE)
     follow += wrap(f"next: {verdict['next_runs']}", _WIDE) if verdict["next_runs"] else []
     # no line ends within an interval

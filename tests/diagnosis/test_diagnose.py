@@ -187,7 +187,7 @@ def test_without_times_a_lag_cannot_be_named_and_the_notes_say_so(lagging):
     found = _checked(diagnosed(lagging.assign(time_s=np.nan), details=True))
     verdict = found.verdict
     assert "servo_lag" not in verdict["effects"]
-    assert "unexplained" in verdict["effects"] + verdict["confusable_with"]
+    assert "unexplained" in verdict["effects"] + verdict["confounded_with"]
     assert "servo_lag not tested" in verdict["notes"] and "thermal_growth not tested" in verdict["notes"]
     causes = found.tables["gap_attribute"].set_index("effect")
     untested = causes.loc[["servo_lag", "thermal_growth"]]

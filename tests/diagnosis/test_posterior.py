@@ -190,7 +190,7 @@ def test_nothing_is_decided_where_nothing_is_most_probable():
     verdict = _decided(((), 0.78, False), ((LAG,), 0.15, False), ((), 0.07, True))
     assert (verdict.label, verdict.effects, verdict.leg, verdict.unexplained) == ("none", (), 0, False)
     assert verdict.probability == pytest.approx(0.78)
-    assert verdict.confusable_with == ("servo_lag", "unexplained")
+    assert verdict.confounded_with == ("servo_lag", "unexplained")
     decisions = {name: verdict.decision(name) for name in ("none", "servo_lag", "unexplained", "backlash")}
     assert decisions == {"none": "named", "servo_lag": "possible", "unexplained": "possible", "backlash": "excluded"}
 
@@ -199,7 +199,7 @@ def test_what_probably_acts_is_named_and_the_probability_is_that_of_exactly_this
     verdict = _decided(
         ((LAG, BACKLASH), 0.73, False), ((BACKLASH,), 0.24, False), ((), 0.01, False), ((BACKLASH, HEAT), 0.02, False)
     )
-    assert verdict.label == "backlash+servo_lag" and verdict.confusable_with == ()
+    assert verdict.label == "backlash+servo_lag" and verdict.confounded_with == ()
     assert verdict.probability == pytest.approx(0.73)
     assert [names for names, _, _ in verdict.rivals] == [frozenset({"backlash"})]
     assert verdict.decision("thermal_growth") == "excluded" and verdict.decision("servo_lag") == "named"
@@ -216,20 +216,20 @@ def test_hypotheses_of_one_set_add_up():
     legs = [EffectTerm("servo_lag", 0, leg) for leg in (1, 2, 3)]
     verdict = _decided(*(((leg,), 0.25, False) for leg in legs), ((BACKLASH,), 0.25, False))
     assert verdict.label == "servo_lag" and verdict.probability == pytest.approx(0.75)
-    assert verdict.confusable_with == ("backlash",) and verdict.groups == ()
+    assert verdict.confounded_with == ("backlash",) and verdict.groups == ()
 
 
 def test_what_is_unexplained_adds_up_over_sets():
     verdict = _decided(((), 0.35, True), ((LAG,), 0.25, True), ((BACKLASH,), 0.15, False), ((TILT,), 0.25, False))
     assert verdict.label == "unexplained" and verdict.probability == pytest.approx(0.6)
-    assert verdict.confusable_with == ("axis_tilt", "servo_lag", "backlash")
+    assert verdict.confounded_with == ("axis_tilt", "servo_lag", "backlash")
 
 
 @pytest.mark.parametrize(("probability", "expected"), [(0.75, "servo_lag+unexplained"), (0.6, "unexplained")])
 def test_with_something_unexplained_the_same_rule_holds(probability, expected):
     verdict = _decided(((LAG,), probability, True), ((), 1.0 - probability, True))
     assert verdict.label == expected
-    assert ("servo_lag" in verdict.confusable_with) is (expected == "unexplained")
+    assert ("servo_lag" in verdict.confounded_with) is (expected == "unexplained")
 
 
 def test_causes_that_exclude_each_other_are_a_group():
@@ -240,7 +240,7 @@ def test_causes_that_exclude_each_other_are_a_group():
     assert set(verdict.effects) == {"servo_lag", "axis_tilt"} and verdict.probability == pytest.approx(0.55)
     decisions = [verdict.decision(name) for name in ("servo_lag", "axis_tilt", "backlash", "thermal_growth")]
     assert decisions == ["named", "group", "group", "excluded"]
-    assert verdict.confusable_with == ("backlash",)
+    assert verdict.confounded_with == ("backlash",)
 
 
 def test_where_no_cause_is_probable_enough_the_most_probable_answer_stands_and_is_called_possible():
@@ -248,7 +248,7 @@ def test_where_no_cause_is_probable_enough_the_most_probable_answer_stands_and_i
     verdict = _decided(((LAG, BACKLASH), 0.36, False), *single, ((), 0.14, True))
     assert set(verdict.effects) == {"servo_lag", "backlash"} and verdict.groups == ()
     assert {verdict.decision(name) for name in verdict.effects} == {"possible"} and verdict.sure < 0.7
-    assert not set(verdict.confusable_with) & set(verdict.effects)
+    assert not set(verdict.confounded_with) & set(verdict.effects)
 
 
 def test_causes_that_have_nothing_to_do_with_each_other_are_no_group():
@@ -260,7 +260,7 @@ def test_causes_that_have_nothing_to_do_with_each_other_are_no_group():
         ((LAG,), 0.16, False),
     )
     assert verdict.groups == () and verdict.effects == ("servo_lag",)
-    assert set(verdict.confusable_with) == {"axis_tilt", "backlash"}
+    assert set(verdict.confounded_with) == {"axis_tilt", "backlash"}
 
 
 def test_a_group_has_as_few_causes_as_make_it_sure():

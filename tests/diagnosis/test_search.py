@@ -194,7 +194,7 @@ def test_what_no_run_separates_shares_the_probability(twins):
     assert found.posterior.marginal("own_weight") == pytest.approx(
         found.posterior.marginal("drive_compliance"), rel=1e-2
     )
-    assert verdict.probability < 0.6 and {*verdict.effects, *verdict.confusable_with} >= TWINS
+    assert verdict.probability < 0.6 and {*verdict.effects, *verdict.confounded_with} >= TWINS
 
 
 def test_it_still_does_once_one_of_them_has_been_fitted():
@@ -334,9 +334,9 @@ def test_a_run_that_did_not_decide_is_not_advised_again(added, share, monkeypatc
         for name, gain in zip(names, gains, strict=True)
     ]
     monkeypatch.setattr(advise_module, "realized", lambda *_: {1: 0.0, 2: 0.0, 3: added})
-    seen = advise_module._realized(inference, SimpleNamespace(truth=None, imitator=None), rows, 0)
+    seen = advise_module._realized(inference, SimpleNamespace(truth=None, rival=None), rows, 0)
     left = [advise_module._as_realized(row, seen)["gain_nats"] for row in rows]
     np.testing.assert_allclose(left, [6.0 * share, 3.0 + 6.0 * share, 5.0 * share, 8.0 * share])
     # of a run that was expected to add little nothing follows
     few = [row | {"gain_nats": 0.1 * row["gain_nats"]} for row in rows]
-    assert advise_module._realized(inference, SimpleNamespace(truth=None, imitator=None), few, 0)[0] == 1.0
+    assert advise_module._realized(inference, SimpleNamespace(truth=None, rival=None), few, 0)[0] == 1.0

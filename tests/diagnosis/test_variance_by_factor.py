@@ -155,7 +155,7 @@ def test_an_effect_that_the_calibration_knows_already_cannot_be_seen():
     table = detectability(case, case.linearise(calibrate(case))).set_index("effect")
     assert table.loc["arm_growth", "visible_share"] < 1e-6 and not table.loc["arm_growth", "testable"]
     assert "geometric parameters" in table.loc["arm_growth", "note"]
-    assert table.loc["servo_lag", "testable"] and table.loc["servo_lag", "imitated_share"] < 0.05
+    assert table.loc["servo_lag", "testable"] and table.loc["servo_lag", "confounded_share"] < 0.05
 
 
 @pytest.fixture(scope="module")
@@ -176,7 +176,9 @@ def test_the_visible_share_is_what_a_calibration_leaves(case, identified, name):
         left += ((columns - plain.base.reshape(3 * len(case), -1) @ fitted) ** 2).sum()
         whole += (columns**2).sum()
     assert table.loc[name, "visible_share"] == pytest.approx(np.sqrt(left / whole), rel=1e-6)
-    assert 0.0 <= table.loc[name, "imitated_share"] <= 1.0 and table.loc[name, "imitated_by"] in set(EFFECTS) - {name}
+    assert 0.0 <= table.loc[name, "confounded_share"] <= 1.0 and table.loc[name, "confounded_with"] in set(EFFECTS) - {
+        name
+    }
 
 
 @pytest.mark.parametrize("name", ["backlash", "base_placement", "thermal_growth", "transmission_error"])

@@ -59,9 +59,9 @@ RUN = ("line_1 in reverse", "run", "line_1", True, 80.0, np.nan, 26, "backlash /
     "changes",
     [
         {},
-        {"effects": "none", "leg": 0, "where": "", "next_runs": "", "confusable_with": ""},
+        {"effects": "none", "leg": 0, "where": "", "next_runs": "", "confounded_with": ""},
         {"probability": 1.0 + 5e-14},
-        {"effects": "unexplained", "leg": 0, "confusable_with": "backlash, none"},
+        {"effects": "unexplained", "leg": 0, "confounded_with": "backlash, none"},
         {"effects": "link_flexure+unexplained", "noise_stated_mm": np.nan, "notes": "a; b"},
     ],
 )
@@ -227,7 +227,7 @@ def test_where_shares_are_not_determined_sizes_are_said_and_why(factor, gap, why
 )
 def test_what_the_advised_run_decides_is_said_to_be_open(separates, left_open, decided):
     """Also where no rival alone is probable enough to be named."""
-    said = answered(runs=[(*RUN[:-2], separates, 3.0)], confusable_with="")["sentences"]
+    said = answered(runs=[(*RUN[:-2], separates, 3.0)], confounded_with="")["sentences"]
     assert f"These data cannot rule out: {left_open}." in said and said[-1].endswith(f"That decides {decided}.")
 
 
@@ -301,7 +301,7 @@ def test_what_the_unexplained_follows_is_said_where_one_variable_predicts_most_o
 
 
 def test_where_nothing_acts_or_the_library_lacks_it_no_effect_is_blamed():
-    nothing = " ".join(answered(effects="none", leg=0, confusable_with="")["sentences"])
+    nothing = " ".join(answered(effects="none", leg=0, confounded_with="")["sentences"])
     assert "these data show no systematic error" in nothing and " is backlash" not in nothing
     unknown = " ".join(answered(effects="unexplained", leg=0)["sentences"])
     assert (

@@ -107,7 +107,7 @@ def test_a_verdict_is_decided_anew_until_prediction_agrees(inference, monkeypatc
     monkeypatch.setattr(diagnose, "_gains", spoilt)
     verdict, fitted, ordered = diagnose._decide(inference, PRIOR)
     assert "servo_lag" in asked[0] and all("servo_lag" not in names for names in asked[1:]) and len(asked) > 1
-    assert "servo_lag" not in verdict.effects and "servo_lag" not in verdict.confusable_with
+    assert "servo_lag" not in verdict.effects and "servo_lag" not in verdict.confounded_with
     assert fitted.posterior.marginal("servo_lag") == 0.0
     assert {term.effect for term, _ in ordered} == fitted.hypothesis.effects == set(verdict.effects)
 

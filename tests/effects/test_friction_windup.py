@@ -96,7 +96,7 @@ def test_amplitudes_and_travel_of_a_drawn_robot_are_found():
     generator = np.random.default_rng(11)
     amplitudes, travel = generator.uniform(3e-4, 8e-4, 3), float(np.exp(generator.uniform(*np.log([0.04, 0.15]))))
     found = _told(_wound_robot(amplitudes, travel))
-    assert found.verdict["effects"] == "friction_windup" and not found.verdict["confusable_with"]
+    assert found.verdict["effects"] == "friction_windup" and not found.verdict["confounded_with"]
     (fitted,) = found.state.effects.values()
     np.testing.assert_allclose(fitted, amplitudes, rtol=0.1)
     assert found.state.shape_values["friction_windup"]["travel_rad"] == pytest.approx(travel, rel=0.2)
@@ -119,5 +119,5 @@ def test_at_stops_far_apart_play_and_wind_up_stand_in_for_each_other():
     frame = arms.measure([arms.active("friction_windup", np.full(arms.DRIVES, 4e-4), {"travel_rad": 0.02}, effect)])
     known = MeasuredRobot(arms.reading(frame), arms.MASSES, arms.NOISE_MM, noise_rad=arms.NOISE_RAD)
     found = diagnose(frame, known, GapSettings(("backlash", "friction_windup", "servo_lag")), details=False)
-    named = {found.verdict["effects"], *found.verdict["confusable_with"].split(", ")}
+    named = {found.verdict["effects"], *found.verdict["confounded_with"].split(", ")}
     assert {"backlash", "friction_windup"} <= named and found.verdict["probability"] < 0.9

@@ -41,7 +41,7 @@ def test_a_robot_whose_lengths_are_known_shows_it():
 def test_a_robot_whose_lengths_are_calibrated_hides_it():
     """It then is no answer and no rival: the table says that it cannot be seen."""
     found = _told("identifiable", None)
-    assert found.verdict["effects"] == "none" and "tracker_scale" not in found.verdict["confusable_with"]
+    assert found.verdict["effects"] == "none" and "tracker_scale" not in found.verdict["confounded_with"]
     row = found.tables["gap_identifiability"].set_index("effect").loc["tracker_scale"]
     assert not row["testable"] and "cannot be separated from the geometric parameters" in row["note"]
     cause = found.tables["gap_attribute"].set_index("effect").loc["tracker_scale"]

@@ -32,7 +32,7 @@ _SHARES = {"share_closed": 0.96, "share_closed_low": 0.94, "share_closed_high": 
 def gap_verdicts(campaign, effects="link_flexure+backlash", **changes):
     """`gap_verdicts` of one campaign."""
     texts = {
-        "confusable_with": "drive_compliance",
+        "confounded_with": "drive_compliance",
         "groups": "",
         "next_runs": NEXT,
         "undecided": "",

@@ -103,7 +103,7 @@ def test_a_group_alone_has_its_own_probability_in_the_headline(frames):
     verdicts = frames["gap_verdicts"].assign(**changes)
     bold, *rest = written(draw("gap", frames | {"gap_attribute": causes, "gap_verdicts": verdicts}).axes[0])
     assert bold.startswith("link flexure or drive compliance (p = 0.91): 0.37 mm gap")
-    assert "confusable" not in " ".join(rest)
+    assert "not ruled out" not in " ".join(rest)
 
 
 def test_the_headline_names_no_cause_where_none_is_probable_enough(frames):
@@ -139,7 +139,7 @@ def test_the_headline_says_verdict_leg_probability_and_what_to_run_next(frames):
     assert bold == "link flexure + backlash, leg 2 (p = 0.97): 0.37 mm gap, 96 % explained (95 %: 94 to 98)"
     text = " ".join(rest)
     assert (
-        "confusable with drive compliance" in text and "x \N{MINUS SIGN}512" in text and f"next: {made_up.NEXT}" in text
+        "not ruled out: drive compliance" in text and "x \N{MINUS SIGN}512" in text and f"next: {made_up.NEXT}" in text
     )
 
 
@@ -165,7 +165,7 @@ def test_odd_verdicts_are_drawn_too(effects, frames):
     changes = {
         "leg": 0,
         "next_runs": "",
-        "confusable_with": "",
+        "confounded_with": "",
         "dropped_points": 0,
         "probability": 1.0,
         "share_closed": 0.0,

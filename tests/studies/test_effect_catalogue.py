@@ -59,12 +59,12 @@ def test_the_most_confounded_effect_is_that_of_the_diagnosis(scene):
     linear = case.linearise(State(np.zeros(len(case.mechanism.parameters)), {}))
     # a diagnosis has chosen the orders of an effect that has none before
     case = replace(case, library={name: one for name, one in case.library.items() if len(one.coordinates)})
-    rows = detectability(case, linear).query("testable and imitated_by != ''").set_index("effect")
+    rows = detectability(case, linear).query("testable and confounded_with != ''").set_index("effect")
     assert len(rows) > 5
     for name, row in rows.iterrows():
         rivals = catalogue.confounded(scene, name)
-        assert rivals[row["imitated_by"]] == pytest.approx(max(rivals.values()), abs=1e-9)
-        assert row["imitated_share"] == pytest.approx(min(max(rivals.values()), 1.0), abs=1e-6)
+        assert rivals[row["confounded_with"]] == pytest.approx(max(rivals.values()), abs=1e-9)
+        assert row["confounded_share"] == pytest.approx(min(max(rivals.values()), 1.0), abs=1e-6)
 
 
 def test_a_share_is_that_of_least_squares():

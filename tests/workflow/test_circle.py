@@ -45,8 +45,8 @@ def test_the_second_campaign_ends_with_the_run_that_the_first_was_advised(folder
 
 def test_the_advised_run_settles_an_uncertain_verdict(folder):
     before, after = (_of(folder, name, "gap_verdicts").iloc[0] for name in ("first", "second"))
-    assert before["confusable_with"] != "" and before["probability"] < 0.9
-    assert after["effects"] == "backlash+drive_compliance" and after["confusable_with"] == ""
+    assert before["confounded_with"] != "" and before["probability"] < 0.9
+    assert after["effects"] == "backlash+drive_compliance" and after["confounded_with"] == ""
     assert after["probability"] > before["probability"] and after["next_runs"] == ""
     found = _of(folder, "second", "gap_parameters").set_index("parameter")[["value", "standard_error"]]
     for name, truth in (("width3", _PLAY_RAD), ("compliance2", 1.0 / _STIFFNESS_N_MM)):

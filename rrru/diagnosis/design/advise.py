@@ -92,7 +92,7 @@ def _runs(inference, contests, masses, limits):
     for number, contest in enumerate(contests):
         if not _have_inputs(planned, contest):
             continue
-        now, added = worth(inference, contest.truth, contest.imitator, planned)
+        now, added = worth(inference, contest.truth, contest.rival, planned)
         start = now.nats()
         for run, one in zip(choice, added, strict=True):
             about = {"contest": number, "separates": contest.separates, "now_nats": start}
@@ -119,7 +119,7 @@ def _realized(inference, contest, rows, number):
     if not whole > OPTIONS.decisive_gain_nats:
         return 1.0, expected
     # evidence for either answer counts
-    found = abs(realized(inference, contest.truth, contest.imitator).get(run, np.inf))
+    found = abs(realized(inference, contest.truth, contest.rival).get(run, np.inf))
     return float(min(found / whole, 1.0)), expected
 
 
@@ -139,7 +139,7 @@ def _planned(case, table, masses):
 
 def _have_inputs(planned, contest):
     """Whether planned runs have what the effects of a Contest need, such as times or temperatures."""
-    answers = contest.truth, contest.imitator
+    answers = contest.truth, contest.rival
     return all(term.effect in planned.library for hypothesis, _ in answers for term in hypothesis.terms)
 
 
@@ -168,7 +168,7 @@ def _poses(inference, contest, masses, limits):
         planned = _planned(case, table, masses)
         if not _have_inputs(planned, contest):
             continue
-        now, added = worth(inference, contest.truth, contest.imitator, planned)
+        now, added = worth(inference, contest.truth, contest.rival, planned)
         chosen, _ = greedy(now, added, OPTIONS.max_advised_poses)
         chosen = chosen[: some.within(chosen, speed, limits.seconds)]
         if not chosen:

@@ -10,13 +10,13 @@ from rrru.diagnosis.verdict import label
 class Contest:
     """Two answers, each (hypothesis, level) as `Posterior.best_of` gives it, and both in words: "a+b / a+c".
 
-    The data are simulated with truth, which has no fewer effects than imitator: the smaller set could not make the data
+    The data are simulated with truth, which has no fewer effects than rival: the smaller set could not make the data
     of the larger one.
     """
 
     separates: str
     truth: tuple
-    imitator: tuple
+    rival: tuple
 
 
 def contests_of(inference, verdict, sizes):

@@ -21,7 +21,7 @@ from rrru.studies.blind_validation.verdicts import is_right
 SURE, ROUNDS = 0.9, 3
 ARMS = ("advised", "random")
 # columns of withheld_verdicts that `ambiguous` reads
-UNSURE = ["check", "robot", "probability", "confusable_with", "next_runs"]
+UNSURE = ["check", "robot", "probability", "confounded_with", "next_runs"]
 _GROUPS = {
     "all": "",
     "a run is advised": "kind == 'run'",
@@ -51,7 +51,7 @@ def ambiguous(verdicts, most):
     verdicts: rows of `withheld_verdicts`. An advised run shows that there are rivals, even if none is probable enough
     to be named.
     """
-    rivals = (verdicts["next_runs"] != "") | (verdicts["confusable_with"] != "")
+    rivals = (verdicts["next_runs"] != "") | (verdicts["confounded_with"] != "")
     which = (verdicts["check"] == "label") & (verdicts["probability"] < SURE) & rivals
     return verdicts.loc[which, "robot"].tolist()[:most]
 

@@ -26,7 +26,7 @@ class Limits:
     oracle_detects: bool = False
     rival: str = ""
     rival_chi2: float = np.nan
-    imitated_share: float = np.nan
+    confounded_share: float = np.nan
 
 
 def of_displacement(gain):

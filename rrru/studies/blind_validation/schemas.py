@@ -79,7 +79,7 @@ oracle_detects
 rival                  str    the wrong explanation nearest to the truth: as many effects as act, up to three where
     the library does not hold the truth; empty where nothing acts
 rival_chi2             float? residual of the noise-free gap with it; a few units are not distinguishable
-imitated_share         float? fraction of the noise-free gap rms that is confounded with it, 0 to 1
+confounded_share         float? fraction of the noise-free gap rms that is confounded with it, 0 to 1
 
 ## withheld_verdicts | tables/withheld_verdicts.parquet | check robot
 Verdict of the diagnosis on each withheld robot, made without the truth.
@@ -91,7 +91,7 @@ leg                    int    the one leg at fault, from 1 on; 0 for all or none
 gap_rms_mm             float  gap of the calibrated model, 3-D
 noise_rms_mm           float  measurement noise, 3-D
 share_closed           float  fraction of the gap that the verdict's effects explain on held-out runs
-confusable_with        str    as in gap_verdicts
+confounded_with        str    as in gap_verdicts
 next_runs              str    as in gap_verdicts
 
 ## withheld_scores | tables/withheld_scores.parquet | check robot

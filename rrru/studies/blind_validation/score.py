@@ -17,7 +17,7 @@ from rrru.studies.blind_validation.parts import is_enough, parts
 from rrru.studies.blind_validation.states import state_of
 from rrru.studies.blind_validation.verdicts import PLANTS, SEVERAL_CAUSES, is_right, scores
 
-_LIMITS = ["oracle_chi2", "oracle_freedom", "oracle_detects", "rival", "rival_chi2", "imitated_share"]
+_LIMITS = ["oracle_chi2", "oracle_freedom", "oracle_detects", "rival", "rival_chi2", "confounded_share"]
 # limits are computed for the checks with one or two causes and the stated noise
 _LIMITED = ("label", "effect", *PLANTS)
 

@@ -14,7 +14,7 @@ VERDICT = [
     "gap_rms_mm",
     "noise_rms_mm",
     "share_closed",
-    "confusable_with",
+    "confounded_with",
     "next_runs",
 ]
 

@@ -29,7 +29,7 @@ _ALL_ACTS = ("none", "one", "two", "outside")
 
 
 # columns that `summary` reads of withheld_limits, withheld_parts and withheld_causes
-LIMITS = ["check", "robot", "weakest", "imitated_share"]
+LIMITS = ["check", "robot", "weakest", "confounded_share"]
 PARTS = ["check", "robot", "part", "kind", "strength", "named"]
 PARTS += ["true_rms_mm", "found_rms_mm", "found_low_mm", "found_high_mm"]
 CAUSES = ["check", "robot", "effect", "probability", "decision", "group", "acts", "strength"]
@@ -74,8 +74,8 @@ _LABEL = (
 )
 _EFFECT = (
     ("all", "unexplained", "", "right", 0.95),
-    ("others are confounded with less than 0.8 of the gap", "unexplained", "imitated_share < 0.8", "right", None),
-    ("others are confounded with 0.8 of the gap or more", "unexplained", "not imitated_share < 0.8", "right", None),
+    ("others are confounded with less than 0.8 of the gap", "unexplained", "confounded_share < 0.8", "right", None),
+    ("others are confounded with 0.8 of the gap or more", "unexplained", "not confounded_share < 0.8", "right", None),
     _CALIBRATED,
 )
 _NOISE = (

@@ -62,7 +62,7 @@ class Cause:
 
     freedom_used: number of its parameters. explained_share: explained fraction of the residual sum of squares, for the
     firmware's ratio of noises. p: that noise explains as much; NaN without degrees of freedom. estimate,
-    standard_error: in `unit`, NaN except for causes with one parameter. imitated_by: confounded causes. limit: upper
+    standard_error: in `unit`, NaN except for causes with one parameter. confounded_with: other causes. limit: upper
     limit of p.
     """
 
@@ -73,7 +73,7 @@ class Cause:
     estimate: float
     standard_error: float
     unit: str
-    imitated_by: tuple
+    confounded_with: tuple
     verdict: str
     limit: float
 
@@ -82,12 +82,12 @@ class Cause:
 class Level:
     """Significance level of the causes.
 
-    level: probability of a false alarm over the causes of all `pieces` of evidence; imitated_from: least fraction of a
-    cause's explained part that a confounded cause explains too.
+    level: probability of a false alarm over the causes of all `pieces` of evidence; confounded_from: least fraction of
+    a cause's explained part that a confounded cause explains too.
     """
 
     level: float
-    imitated_from: float
+    confounded_from: float
     pieces: int = 1
 
     def limit(self, tests, name, more=0):
@@ -110,12 +110,12 @@ def causes(result, left, level):
     leader = min(others, key=lambda one: np.nan_to_num(one.p, nan=1.0))
     if first.p < first.limit and leader.p < first.p:
         p = float(np.min(tests.p(BAD_READING, with_columns=tests.columns[leader.cause][0])))
-        first = replace(first, p=p, verdict=_verdict(p, first.imitated_by, first.limit))
+        first = replace(first, p=p, verdict=_verdict(p, first.confounded_with, first.limit))
     elif first.p < first.limit:
         others = _acting_on_all(CauseTests(without(result, left.suspect)), level)
     # a cause confounded with a visible one cannot be ruled out either
     undecided = [cause for cause in (first, *others) if cause.verdict in (NOT_DECIDABLE, ONE_READING)]
-    rivals = {name for cause in undecided for name in cause.imitated_by}
+    rivals = {name for cause in undecided for name in cause.confounded_with}
     return tuple(
         replace(cause, verdict=NOT_DECIDABLE) if cause.cause in rivals else cause for cause in (first, *others)
     )
@@ -146,7 +146,7 @@ def _verdict(p, confounded, limit, p_without_any=lambda: 0.0):
 def _bad_reading(tests, left, level):
     """The cause that one reading is wrong: the most suspicious one."""
     suspect = left.suspect
-    confounded = tests.confounded_causes(BAD_READING, level.imitated_from, suspect or 0)
+    confounded = tests.confounded_causes(BAD_READING, level.confounded_from, suspect or 0)
     share = p = estimate = error = np.nan
     if suspect is not None:
         share = tests.explained_share(BAD_READING, suspect)
@@ -161,7 +161,7 @@ def _acting_on_all(tests, level):
     """The causes that act on all readings, a list."""
     answers = []
     for name, (_, unit) in tests.columns.items():
-        p, confounded = float(tests.p(name)), tests.confounded_causes(name, level.imitated_from)
+        p, confounded = float(tests.p(name)), tests.confounded_causes(name, level.confounded_from)
         limit = level.limit(tests, name)
         verdict = _verdict(p, confounded, limit, lambda name=name: tests.p_without_any(name))
         rank, share = tests.added[name].rank, tests.explained_share(name)

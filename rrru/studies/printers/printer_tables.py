@@ -23,7 +23,7 @@ _NOT_FITTED |= {"suspect": "", "cause": "not decidable", "effector_tilt": "", "n
 def tables(printers, settings):
     """Frames by table name: printers, printer_parameters, printer_readings, printer_causes.
 
-    settings: `stopping_step`, `level` and `imitated_from` of the configuration's `printers` section. A printer that
+    settings: `stopping_step`, `level` and `confounded_from` of the configuration's `printers` section. A printer that
     cannot be read or fitted has only a row in `printers`, with the reason. Printers that share readings are one piece
     of evidence. For causes of the machines the level is divided by the number of pieces that can show any cause.
     """
@@ -55,7 +55,7 @@ def level_of(printers, settings, groups=None):
     """The Level for printers that are tested together."""
     groups = _groups(printers) if groups is None else groups
     pieces = max(len({groups[printer.name] for printer in printers if _decides(printer)}), 1)
-    return Level(settings["level"], settings["imitated_from"], pieces)
+    return Level(settings["level"], settings["confounded_from"], pieces)
 
 
 def _printer_row(judged, twins):
@@ -117,7 +117,7 @@ def _notes(result, answers, common, dense):
         yield f"arms as saved, not fitted: heights alone would give their common length with {alone}"
     else:
         yield f"arms known to {result.half_widths[6:].max():.1f} mm (95 %)"
-    if any(one.cause == "caliper_scale" and "caliper_offset" in one.imitated_by for one in answers):
+    if any(one.cause == "caliper_scale" and "caliper_offset" in one.confounded_with for one in answers):
         low, high = result.printer.distance_mm.min(), result.printer.distance_mm.max()
         span = f"all distances are {low:.1f} to {high:.1f} mm"
         yield f"a scale error of the calipers is confounded with an offset: {span}"
@@ -193,10 +193,10 @@ def _reading_rows(judged):
 
 def _cause_rows(judged):
     """Rows of `printer_causes`."""
-    result, imitated_from = judged.result, judged.level.imitated_from
+    result, confounded_from = judged.result, judged.level.confounded_from
     tests, rows = CauseTests(result), []
     for one in judged.causes:
-        undetectable = not _decides(result.printer) or tests.always_confounded(one.cause, imitated_from)
+        undetectable = not _decides(result.printer) or tests.always_confounded(one.cause, confounded_from)
         detectable = np.nan if undetectable else tests.detectable_mm(one.cause, one.limit)
-        rows.append(asdict(one) | {"detectable_mm": detectable, "imitated_by": ", ".join(one.imitated_by)})
+        rows.append(asdict(one) | {"detectable_mm": detectable, "confounded_with": ", ".join(one.confounded_with)})
     return pd.DataFrame(rows).assign(printer=result.printer.name)

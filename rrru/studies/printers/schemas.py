@@ -98,7 +98,7 @@ unit                   str    of the number; empty for causes with several
 detectable_mm          float? size with a power of 0.9 for p below the limit (noise in the firmware's ratio): rms over
     the readings of its part that the calibration does not absorb; of a bad reading its own error. Passing is not yet
     found: see verdict. Null where it is always confounded with another cause, and where nothing is decidable
-imitated_by            str    other causes that are confounded with it, joined by a comma; empty where none
+confounded_with            str    other causes that are confounded with it, joined by a comma; empty where none
 verdict                str    whether it acts: found where p is below the limit, also without any single reading,
     and no other cause is confounded with it {found, not found, not decidable, not decidable (rests on one reading)}
 """)

@@ -41,7 +41,7 @@ def tables(studied: Studied) -> dict[str, pd.DataFrame]:
 def _verdict(studied: Studied) -> dict:
     """The row of `real_verdicts`."""
     found, series, left = _found(studied), studied.series, studied.held_out_mm
-    names = ("effects", "probability", "where", "confusable_with", "noise_rms_mm", "gap_rms_mm", "gap_after_rms_mm")
+    names = ("effects", "probability", "where", "confounded_with", "noise_rms_mm", "gap_rms_mm", "gap_after_rms_mm")
     names = (*names, "share_closed", "share_closed_low", "share_closed_high", "noise_stated_mm", "next_runs", "points")
     verdict = {name: found[name] for name in (*names, "dropped_points")}
     before = studied.step("b").held_out_mm
@@ -80,7 +80,7 @@ def _found(studied: Studied) -> Mapping[str, Any]:
     """The verdict of the diagnosis, or the default values of a series without diagnosis."""
     if studied.diagnosis:
         return studied.diagnosis.verdict
-    texts = dict.fromkeys(("where", "confusable_with", "next_runs", "notes", "no_answer"), "")
+    texts = dict.fromkeys(("where", "confounded_with", "next_runs", "notes", "no_answer"), "")
     return defaultdict(lambda: np.nan, texts, effects=UNDIAGNOSED, points=studied.plain.count, dropped_points=0)
 
 

@@ -47,7 +47,7 @@ def study(frame, section, name):
     steps, step_errors = length_tables.steps(case, _chain(case, chosen), held_out(frame, read))
     notes, where, next_runs, rivals = _words(case, verdict, belts)
     row = length_tables.verdict_row(
-        case, verdict, step_errors, where=where, confusable_with=rivals, next_runs=next_runs
+        case, verdict, step_errors, where=where, confounded_with=rivals, next_runs=next_runs
     )
     row |= {"notes": " ".join([*notes, *length_tables.bad_words(case, belts, row_numbers(frame, read))])}
     return {

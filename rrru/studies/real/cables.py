@@ -50,7 +50,7 @@ def study(frame, section, name):
     chain = list(dict.fromkeys([(), (effect_models[0],), (effect_models[-1],), chosen.effect_models]))
     steps, errors = length_tables.steps(case, chain, held_out(frame, read))
     notes, where, next_runs, rivals = _words(case, verdict, drums)
-    row = length_tables.verdict_row(case, verdict, errors, where=where, confusable_with=rivals, next_runs=next_runs)
+    row = length_tables.verdict_row(case, verdict, errors, where=where, confounded_with=rivals, next_runs=next_runs)
     rows = row_numbers(frame, read)
     row |= {"notes": " ".join([*notes, *length_tables.bad_words(case, drums, rows)])}
     return {

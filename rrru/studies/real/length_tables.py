@@ -61,7 +61,7 @@ def steps(case, chain, held_out):
     return pd.DataFrame(rows), errors
 
 
-def verdict_row(case, verdict, errors, *, where, confusable_with, next_runs):
+def verdict_row(case, verdict, errors, *, where, confounded_with, next_runs):
     """The row of real_verdicts without notes; errors: of the steps, with those of the bare frame and of the verdict."""
     effects, probability, chosen = verdict
     before, after = errors.get((), errors[chosen.effect_models]), errors[chosen.effect_models]
@@ -72,7 +72,7 @@ def verdict_row(case, verdict, errors, *, where, confusable_with, next_runs):
         "effects": "+".join(effects) or "none",
         "probability": probability,
         "where": where,
-        "confusable_with": confusable_with,
+        "confounded_with": confounded_with,
         "noise_rms_mm": noise,
         "gap_rms_mm": gaps[0],
         "gap_after_rms_mm": gaps[1],

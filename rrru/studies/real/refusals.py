@@ -10,7 +10,7 @@ REFUSED = "refused"
 
 def refused(series: Series, error: RrruError) -> dict[str, pd.DataFrame]:
     """Frames by name, without the campaign: the row of `real_verdicts` with the reason in its notes, no numbers."""
-    row = dict.fromkeys(("where", "confusable_with", "next_runs"), "") | {"points": 0, "dropped_points": 0}
+    row = dict.fromkeys(("where", "confounded_with", "next_runs"), "") | {"points": 0, "dropped_points": 0}
     reason = {"effects": REFUSED, "notes": f"left out: {error}", **named(series)}
     return {"real_verdicts": pd.DataFrame([row | reason])}
 

@@ -21,7 +21,7 @@ effects                str    names joined by + in the order of their share; non
     cannot be used: notes says why, and every other number is null
 probability            float? of this whole verdict, 0 to 1
 where                  str    where the effects act; empty where nothing acts or no site is known
-confusable_with        str    effects confounded with the verdict in this series; empty where none
+confounded_with        str    effects confounded with the verdict in this series; empty where none
 noise_rms_mm           float? estimated noise, instrument and non-repeatability
 gap_rms_mm             float? error of the calibrated model, noise subtracted
 gap_after_rms_mm       float? the same, predicted for the corrected model on rows that it was not fitted on

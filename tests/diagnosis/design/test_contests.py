@@ -28,7 +28,7 @@ def _contests(sets, sizes=None, **verdict):
 
 
 def _names(contest):
-    return [{term.effect for term in answer[0].terms} for answer in (contest.truth, contest.imitator)]
+    return [{term.effect for term in answer[0].terms} for answer in (contest.truth, contest.rival)]
 
 
 def test_members_of_a_group_come_first_each_in_the_place_of_the_most_probable():

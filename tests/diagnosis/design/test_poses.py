@@ -116,7 +116,7 @@ def rivals():
         case, calibrated, calibrated, fit_model(case, [calibrated]), evidence, posterior, *posterior.best()
     )
     verdict = decide(posterior, library)
-    assert {*verdict.effects, *verdict.confusable_with} >= set(library) and verdict.probability < 0.6
+    assert {*verdict.effects, *verdict.confounded_with} >= set(library) and verdict.probability < 0.6
     return found, verdict
 
 

@@ -95,7 +95,7 @@ def test_what_is_unsure_beside_rivals_is_ambiguous():
         ("effect", "without its effect", 0.5, "backlash", ""),
         ("label", "advised", 0.5, "", "line_1"),
     ]
-    verdicts = pd.DataFrame(verdict_rows, columns=["check", "robot", "probability", "confusable_with", "next_runs"])
+    verdicts = pd.DataFrame(verdict_rows, columns=["check", "robot", "probability", "confounded_with", "next_runs"])
     assert advice.ambiguous(verdicts, 20) == ["rival", "advised"] and advice.ambiguous(verdicts, 1) == ["rival"]
 
 

@@ -243,7 +243,10 @@ def test_the_summary_counts_whom_it_says():
     )
     weak = {"r6": 0.2, "r7": 1.5}
     limit = pd.DataFrame(
-        [{"check": "label", "robot": r, "weakest": weak.get(r, np.nan), "imitated_share": 0.1} for r in scores["robot"]]
+        [
+            {"check": "label", "robot": r, "weakest": weak.get(r, np.nan), "confounded_share": 0.1}
+            for r in scores["robot"]
+        ]
     )
     nothing = (pd.DataFrame(columns=TABLES[f"withheld_{name}"].names) for name in ("parts", "causes"))
     table = check("withheld_summary", summary(scores, limit, *nothing)).set_index(["group", "figure"])
@@ -269,7 +272,7 @@ def test_field_campaigns_are_scored_against_the_users_answers(tmp_path):
     path = tmp_path / "answers.csv"
     path.write_text("campaign,effects,leg\na,servo_lag+backlash,0\nb,backlash,2\nc,none,\nd,outside,0\n")
     verdict = {"probability": 0.7, "gap_rms_mm": 0.2, "noise_rms_mm": 0.04, "share_closed": 0.9}
-    verdict |= {"confusable_with": "", "next_runs": ""}
+    verdict |= {"confounded_with": "", "next_runs": ""}
     said = {
         "a": ("backlash+servo_lag", 0),
         "b": ("backlash", 1),

@@ -14,7 +14,7 @@ SOURCE = DATA / "linear_delta.json"
 ENTRIES = {entry["id"]: entry for entry in json.loads(SOURCE.read_text())}
 PRINTERS = {printer.name: printer for printer in read(SOURCE)}
 STEP, LEVEL = 1e-5, 0.05
-SETTINGS = {"stopping_step": STEP, "level": LEVEL, "imitated_from": 0.95}
+SETTINGS = {"stopping_step": STEP, "level": LEVEL, "confounded_from": 0.95}
 NINE = np.array([0.6, 0.002, -0.003, 0.4, -0.3, 0.2, 0.7, -0.5, 0.4])
 HEIGHTS, DISTANCES = PRINTERS["printer_16"], PRINTERS["printer_22"]
 # noise of a simulated distance; the firmware's weights make a height as much better
@@ -69,5 +69,5 @@ def diagnosed(printer):
     """Fit, left-out readings, causes by name and the diagnosis of a printer."""
     result = printer_fit.fit_printer(printer, STEP, LEVEL)
     left = printer_causes.left_out(result)
-    answers = printer_causes.causes(result, left, printer_causes.Level(LEVEL, SETTINGS["imitated_from"]))
+    answers = printer_causes.causes(result, left, printer_causes.Level(LEVEL, SETTINGS["confounded_from"]))
     return result, left, {one.cause: one for one in answers}, printer_causes.diagnosis(answers)

@@ -144,8 +144,8 @@ def test_an_error_of_the_calipers_is_seen_and_its_kind_is_not_decidable(caliper)
     assert (
         scale.p < 1e-4
         and offset.p < 1e-4
-        and "caliper_offset" in scale.imitated_by
-        and "caliper_scale" in offset.imitated_by
+        and "caliper_offset" in scale.confounded_with
+        and "caliper_scale" in offset.confounded_with
     )
     true, one = (0.02, scale) if "scale" in caliper else (2.0, offset)
     assert abs(one.estimate - true) < 4.0 * one.standard_error
@@ -159,7 +159,7 @@ def test_seven_heights_decide_nothing(printer):
     result, left, answers, diagnosis = diagnosed(printer)
     assert result.freedom == 1 and diagnosis == "not decidable" and left.suspect is None and np.isnan(left.p).all()
     for name, one in answers.items():
-        assert one.verdict == "not decidable" and set(one.imitated_by) == set(answers) - {name}
+        assert one.verdict == "not decidable" and set(one.confounded_with) == set(answers) - {name}
     assert answers["tower_lean"].explained_share == pytest.approx(1.0) and answers[
         "arms"
     ].explained_share == pytest.approx(1.0)
@@ -262,11 +262,11 @@ def test_what_is_said_to_be_detectable_passes_nine_times_of_ten(name):
 
 def test_an_always_confounded_cause_is_never_found():
     evidence = evidence_of(DISTANCES)
-    assert [name for name in evidence.columns if evidence.always_confounded(name, SETTINGS["imitated_from"])][:2] == [
+    assert [name for name in evidence.columns if evidence.always_confounded(name, SETTINGS["confounded_from"])][:2] == [
         "caliper_scale",
         "caliper_offset",
     ]
-    assert not evidence.always_confounded("tower_lean", SETTINGS["imitated_from"])
+    assert not evidence.always_confounded("tower_lean", SETTINGS["confounded_from"])
     generator = np.random.default_rng(4)
     for offset_mm in (0.5, 2.0, 8.0):
         answers = diagnosed(simulated(DISTANCES, NINE, 0.01, generator, offset_mm=offset_mm))[2]

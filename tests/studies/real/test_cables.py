@@ -35,12 +35,12 @@ def test_radius_that_is_off_is_named():
     np.testing.assert_allclose(found, anchors, atol=30.0)
 
 
-def test_common_factor_is_confusable_with_the_camera():
+def test_common_factor_is_confounded_with_the_camera():
     frame, _ = simulated.cables(4, rows=60)
     frame[["x_m", "y_m"]] *= 1.02
     verdict = cables.study(frame, SECTION, "mine")["real_verdicts"].iloc[0]
     assert verdict["effects"] == "drum_radius" and verdict["where"] == "all drums by one factor"
-    assert "camera_scale" in verdict["confusable_with"] and "rule" in verdict["next_runs"]
+    assert "camera_scale" in verdict["confounded_with"] and "rule" in verdict["next_runs"]
 
 
 def test_degrees_and_millimetres():

@@ -20,7 +20,7 @@ rule calibrate_printers:
     log:
         f"{RESULTS}/logs/printers.log",
     params:
-        settings=reads("printers.stopping_step", "printers.level", "printers.imitated_from"),
+        settings=reads("printers.stopping_step", "printers.level", "printers.confounded_from"),
         code=code("printers"),
     script:
         "../../scripts/printers.py"
