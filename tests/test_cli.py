@@ -101,6 +101,60 @@ def test_what_is_wrong_gets_one_message_and_its_exit_code(arguments, code, said,
     assert not printed and not (tmp_path / "results").exists()
 
 
+_FIELD = ("data/field_12.csv", "--robot", "rrru3")
+_LIST = ("tests/campaign/ingest/files/leica.csv", "--robot", "rrru3", "--set", "format=leica", "--frame", "register")
+# commands with the place of the file that cannot be read, the code where there is no file, and that of other content
+_READERS = {
+    **{f"{name} --config": ((name, *_FIELD, "--config", None), cli.WRONG, cli.WRONG) for name in ("diagnose", "check")},
+    **{f"{name} --config": ((name, "--config", None), cli.WRONG, cli.WRONG) for name in ("robots", "effects")},
+    **{f"{name} FILE": ((name, None, *_FIELD[1:]), cli.WRONG, cli.REFUSED) for name in ("diagnose", "check")},
+    **{
+        f"{name} --commands": ((name, *_LIST, "--commands", None), cli.WRONG, cli.REFUSED)
+        for name in ("diagnose", "check")
+    },
+    **{f"{name} --robot": ((name, _FIELD[0], "--robot", None), cli.WRONG, cli.WRONG) for name in ("diagnose", "check")},
+    "effects --robot": (("effects", "--robot", None), cli.WRONG, cli.WRONG),
+    "printer": (("printer", None), cli.REFUSED, cli.REFUSED),
+    "compare": (("compare", None, None), cli.WRONG, cli.WRONG),
+}
+_SUFFIXES = {"--config": ".yaml", "--robot": ".urdf", "printer": ".cfg"}
+
+
+@pytest.mark.parametrize("reader", _READERS)
+@pytest.mark.parametrize("kind", ["missing", "folder", "binary", "empty"])
+def test_a_file_that_cannot_be_read_gets_one_plain_message(reader, kind, tmp_path, capsys):
+    arguments, none, content = _READERS[reader]
+    file = tmp_path / f"mine{_SUFFIXES.get(reader.split()[-1], '.csv')}"
+    if kind == "folder":
+        file.mkdir()
+    elif kind != "missing":
+        file.write_bytes(b"\x00\xff\xfe\x01binary\x80" if kind == "binary" else b"")
+    out = ("--out", tmp_path / "results") if arguments[0] == "diagnose" else ()
+    code, printed, message = ran(capsys, *(file if one is None else one for one in arguments), *out)
+    assert code == (none if kind in ("missing", "folder") else content) and not printed
+    # a printer's file has a problem for every setting that it lacks
+    one = message.count("\n") == 1 or (reader, kind) == ("printer", "empty")
+    assert message.startswith("error: ") and one and str(file) in message
+    assert "allowed: " in message or reader == "compare"
+    for words in ("Errno", "errno", "codec", "Traceback", "NoneType", "<unicode string>", "rrru failed"):
+        assert words not in message
+    said = {
+        "missing": "no such file",
+        "folder": "is a directory" if reader == "printer" else "is a folder",
+    }
+    assert reader == "compare" or said.get(kind, "") in message.lower()
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [("a: [1, 2\nb: {", "mine.yaml, line 2: expected"), ("- a", "mine.yaml: is no mapping; allowed: ")],
+)
+def test_a_configuration_that_is_none_is_named_with_its_line(text, said, tmp_path, capsys):
+    (tmp_path / "mine.yaml").write_text(text)
+    code, _, message = ran(capsys, "robots", "--config", tmp_path / "mine.yaml")
+    assert code == cli.WRONG and said in message and "unicode string" not in message and "list" not in message
+
+
 @pytest.mark.parametrize("number", range(len(MISTAKES)), ids=list(MISTAKES))
 def test_a_gross_mistake_in_a_file_gets_one_message(number, tmp_path, capsys):
     name, own, handed = with_mistake(number, SEED, STOPS)

@@ -12,7 +12,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
-from rrru.errors import ConfigError
+from rrru.errors import ConfigError, not_a_file, why_unreadable
 from rrru.formats import urdf_reader as urdf_files
 from rrru.formats.couplings import of_equalities, of_mimics
 from rrru.formats.inertia import point_masses_of
@@ -122,12 +122,12 @@ def mjcf_parts(path, platform):
 def _existing(path):
     """The Path of a file that exists and is text."""
     file = Path(path)
-    if not file.is_file():
-        raise ConfigError(f"{file}: there is no such file; allowed: a file")
+    if why := not_a_file(file):
+        raise ConfigError(f"{file}: {why}; allowed: a URDF or MJCF file")
     try:
         file.read_text("utf-8")
     except (OSError, UnicodeDecodeError) as error:
-        raise ConfigError(f"{file}: {error}; allowed: a file that can be read, in UTF-8") from None
+        raise ConfigError(f"{file}: {why_unreadable(error)}; allowed: a file that can be read, in UTF-8") from None
     return file
 
 

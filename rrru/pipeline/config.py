@@ -6,7 +6,7 @@ A workflow rule passes only these parts to its script, so that a change reruns o
 import hashlib
 from pathlib import Path
 
-from rrru.errors import ConfigError
+from rrru.errors import ConfigError, not_a_file
 from rrru.pipeline.jobs.outputs import GAP_FIGURES
 from rrru.plugins import module_file, own_code_digest
 from rrru.robots.catalogue import OWN
@@ -215,11 +215,11 @@ def check_files(config):
     """Raise ConfigError where a measured campaign, or the robot of one, has no file."""
     for name, section in config["campaigns"].items():
         own = own_robot_file(entry(config, "robots", section["robot"], f"campaigns.{name}"))
-        if own and not own.is_file():
-            raise ConfigError(f"robots.{section['robot']}: there is no file {own}")
+        if own and (why := not_a_file(own)):
+            raise ConfigError(f"robots.{section['robot']}: {own}: {why}; allowed: a URDF or MJCF file")
         for key, file in zip(("ingest", "commands"), ingested_files(section), strict=False):
-            if not Path(file).is_file():
-                raise ConfigError(f"campaigns.{name}.{key}: there is no file {file}")
+            if why := not_a_file(file):
+                raise ConfigError(f"campaigns.{name}.{key}: {file}: {why}; allowed: a file of measurements")
 
 
 def ingested_files(section):

@@ -21,10 +21,15 @@ def read_config(overlays=()):
     for file in (DEFAULTS, *overlays):
         try:
             section = yaml.safe_load(Path(file).read_text(encoding="utf-8"))
+        except yaml.MarkedYAMLError as error:
+            line = f", line {error.problem_mark.line + 1}" if error.problem_mark else ""
+            raise ConfigError(f"{file}{line}: {error.problem}; allowed: a YAML file") from error
         except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
             raise ConfigError(f"{file}: {why_unreadable(error)}; allowed: a YAML file") from error
         if not isinstance(section, dict):
-            raise ConfigError(f"{file} holds {type(section).__name__}; allowed: a mapping of sections")
+            found = "is empty" if section is None else "is no mapping"
+            allowed = "a YAML file with sections such as robots: and campaigns:"
+            raise ConfigError(f"{file}: {found}; allowed: {allowed}")
         config = merged(config, section)
     check_config(config)
     return config

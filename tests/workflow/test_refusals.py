@@ -14,7 +14,7 @@ from tests.workflow.folder import dry_run, run
         ("campaigns: {mine: {robot: rrru9, ingest: a.csv}}", "rrru9"),
         (
             "campaigns: {mine: {robot: rrru3, ingest: nothere.csv}}",
-            "campaigns.mine.ingest: there is no file nothere.csv",
+            "campaigns.mine.ingest: nothere.csv: there is no such file",
         ),
         (
             "campaigns: {crooked: {passes: [{trajectories: [nosuch]}]}}",

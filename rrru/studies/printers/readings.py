@@ -51,9 +51,11 @@ def read(path):
     """
     problems = Problems(path)
     try:
-        content = json.loads(Path(path).read_text())
+        content = json.loads(Path(path).read_text(encoding="utf-8"))
     except OSError as error:
         problems.refuse_now(value=error.strerror or str(error), allowed="a file that can be read")
+    except UnicodeDecodeError:
+        problems.refuse_now(value="no text in UTF-8", allowed="JSON, a list of printers")
     except (ValueError, RecursionError) as error:
         problems.refuse_now(value=f"no JSON ({error})", allowed="JSON, a list of printers")
     if isinstance(content, dict):
