@@ -5,16 +5,15 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
-from scipy.linalg import block_diag, cho_solve, solve_triangular
+from scipy.linalg import cho_solve, solve_triangular
 
 from rrru.campaign.noise import along_runs
 from rrru.diagnosis.evidence import ModelEvidence
 from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.problem import Case
 from rrru.diagnosis.terms import signatures
-from rrru.diagnosis.terms import spread as spread_of
 from rrru.diagnosis.whitened import discrepancy_scales, spectrum
-from rrru.estimation.cross_validation import CrossValidation, choose_folds
+from rrru.estimation.cross_validation import choose_folds, complement_fits
 from rrru.estimation.noise_model import half_waves, lengths
 
 
@@ -147,37 +146,14 @@ class HeldOut:
         """ComplementFit of calibration and terms by the number of the fold that is left out."""
         linear, count = self.evidence.linear, self.evidence.linear.base.shape[-1]
         sd, mean = linear.base_prior or (np.full(count, np.inf), np.zeros(count))
-        places, mixing = [np.arange(count)], [np.eye(count)]
-        for term in terms:
-            places.append(self._places[term.effect, term.shape])
-            mixing.append(spread_of(self.evidence.library[term.effect].coordinates, term.legs))
         precision = np.concatenate([sd, self.evidence.scales(terms, prior_scales)]) ** -2.0
         moment = np.zeros(len(precision))
         moment[:count] = np.where(np.isfinite(sd), mean, 0.0) * precision[:count]
-        return self._at(level).fits(np.concatenate(places), block_diag(*mixing), precision, moment)
-
-    def _at(self, level):
-        """The CrossValidation of all columns and the data at a level (an index), made once."""
-        if level not in self._made:
-            linear = self.evidence.linear
-            together = np.concatenate([linear.base, *linear.columns.values(), linear.data[..., None]], axis=-1)
-            if self._whole_runs:
-                together, _ = along_runs(together, self.case.series)
-            white = together / np.sqrt(self._left(level))[..., None]
-            self._made[level] = CrossValidation.of(white, self.fold)
-        return self._made[level]
-
-    @cached_property
-    def _made(self):
-        """CrossValidation by level."""
-        return {}
-
-    @cached_property
-    def _places(self):
-        """Places of the columns of an effect (name, shape) among all."""
-        linear = self.evidence.linear
-        ends = np.cumsum([linear.base.shape[-1], *(columns.shape[-1] for columns in linear.columns.values())])
-        return {key: np.arange(*place) for key, place in zip(linear.columns, pairwise(ends), strict=True)}
+        together = np.concatenate([*self._blocks(terms), linear.data[..., None]], axis=-1)
+        if self._whole_runs:
+            together, _ = along_runs(together, self.case.series)
+        white = together / np.sqrt(self._left(level))[..., None]
+        return complement_fits(white, self.fold, precision, moment)
 
     @cached_property
     def _whole_runs(self):

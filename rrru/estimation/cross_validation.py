@@ -7,7 +7,6 @@ lose half of the digits.
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Self
 
 import numpy as np
 import numpy.typing as npt
@@ -89,31 +88,19 @@ class ComplementFit:
         return np.asarray(solve_triangular(self.factor, (rows * self.unit).T, lower=True, check_finite=False))
 
 
-@dataclass(frozen=True, eq=False)
-class CrossValidation:
-    """Complements of folds: sums (k + 1, k + 1) of squares and products of whitened columns and data, by fold."""
+def complement_fits(
+    columns: FloatArray, fold: IntArray, precision: FloatArray, moment: FloatArray
+) -> dict[int, ComplementFit]:
+    """ComplementFit by fold of the parameters (k,) of whitened columns (m, a, k + 1), the data last.
 
-    complements: dict[int, FloatArray]
-
-    @classmethod
-    def of(cls, columns: FloatArray, fold: IntArray) -> Self:
-        """Of whitened columns (m, a, k + 1), the data last, with fold numbers (m,)."""
-        return cls(complement_sums(fold_sums(columns, fold)))
-
-    def fits(
-        self, places: IntArray, mixing: FloatArray, precision: FloatArray, moment: FloatArray
-    ) -> dict[int, ComplementFit]:
-        """ComplementFit by fold of the parameters (q,) of a model whose columns are columns[..., places] @ mixing.
-
-        places (r,), mixing (r, q); precision (q,), moment (q,): of the normal priors, the moment being precision times
-        mean.
-        """
-        result = {}
-        for number, sums in self.complements.items():
-            gram: FloatArray = mixing.T @ sums[np.ix_(places, places)] @ mixing
-            unit: FloatArray = 1.0 / np.sqrt(np.maximum(np.diag(gram) + precision, 1e-300))
-            scaled = unit[:, None] * (gram + np.diag(precision)) * unit
-            factor: FloatArray = np.asarray(np.linalg.cholesky(scaled + _RIDGE * np.eye(len(unit))))
-            target = mixing.T @ sums[places, -1] + moment
-            result[number] = ComplementFit(unit * cho_solve((factor, True), unit * target), unit, np.asarray(factor))
-        return result
+    fold (m,): numbers of the folds; precision (k,), moment (k,): of the normal priors, the moment being precision times
+    mean.
+    """
+    result = {}
+    for number, sums in complement_sums(fold_sums(columns, fold)).items():
+        gram, target = sums[:-1, :-1], sums[:-1, -1] + moment
+        unit: FloatArray = 1.0 / np.sqrt(np.maximum(np.diag(gram) + precision, 1e-300))
+        scaled = unit[:, None] * (gram + np.diag(precision)) * unit
+        factor: FloatArray = np.asarray(np.linalg.cholesky(scaled + _RIDGE * np.eye(len(unit))))
+        result[number] = ComplementFit(unit * cho_solve((factor, True), unit * target), unit, factor)
+    return result

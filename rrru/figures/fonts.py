@@ -4,6 +4,8 @@ A PDF holds text that is laid out already: its tables of kerning and ligatures a
 longer than the glyphs themselves.
 """
 
+from types import SimpleNamespace
+
 from fontTools.ttLib import registerCustomTableClass
 from fontTools.ttLib.tables.otBase import BaseTTXConverter
 
@@ -12,6 +14,10 @@ _LAYOUT_TABLES = ("GDEF", "GPOS", "GSUB")
 
 class UnusedTable(BaseTTXConverter):
     """A layout table that a subset of its font goes without."""
+
+    def decompile(self, _data, _font):
+        """Read nothing: fontTools looks at the version and at `LookupList` of every layout table before it prunes."""
+        self.table = SimpleNamespace(Version=0)
 
     def prune_pre_subset(self, _font, _options):
         """Whether fontTools keeps the table in a subset: never."""
