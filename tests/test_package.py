@@ -24,7 +24,22 @@ def installed(tmp_path_factory):
     subprocess.run(command, cwd=folder, check=True, capture_output=True)
     with zipfile.ZipFile(next((folder / "made").glob("rrru-0.*.whl"))) as wheel:
         wheel.extractall(folder / "site")
+    _take_compiled(folder / "site")
     return folder / "site"
+
+
+def _take_compiled(site):
+    """Give a site the kernels that Numba has compiled of the same sources, where there are any."""
+    for file in (ROOT / "rrru").rglob("__pycache__/*.nb[ic]"):
+        source = file.parents[1] / f"{file.name.partition('.')[0]}.py"
+        own = site / source.relative_to(ROOT)
+        if not own.is_file():
+            # of a module that is gone
+            continue
+        assert own.read_bytes() == source.read_bytes()
+        shutil.copystat(source, own)
+        own.parent.joinpath("__pycache__").mkdir(exist_ok=True)
+        shutil.copy2(file, own.parent / "__pycache__")
 
 
 def test_the_command_of_the_wheel_needs_neither_the_project_nor_the_extras(installed, tmp_path):

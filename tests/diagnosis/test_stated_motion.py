@@ -23,6 +23,7 @@ from rrru.pipeline.setup import as_measured
 from rrru.robots.hexapod import hexapod
 from rrru.store import tables
 from tests.diagnosis import arms, hexapod_stops
+from tests.refusals import refusals
 from tests.schemas import check_measurements
 
 _HEXAPOD = hexapod(
@@ -192,17 +193,7 @@ def test_a_robot_that_rests_has_no_speed_and_one_that_does_not_has_one():
         assert "last_move" in passed.untestable["read_before_rest"]
 
 
-@pytest.mark.parametrize(
-    ("motion", "message"),
-    [
-        ("stopping", "motion is 'stopping'; allowed: stop_and_go, continuous"),
-        ({"kind": "go"}, "motion is 'go'; allowed: stop_and_go, continuous"),
-        ({"kind": "stop_and_go", "between": "joints"}, "motion.between is 'joints'; allowed: tool, drives"),
-        ({"kind": "continuous", "between": "tool"}, "motion.between of continuous motion; allowed: with kind stop_and"),
-        ({"kind": "stop_and_go", "path": "tool"}, "motion has the key 'path'; allowed: kind, between"),
-        ({"between": "tool"}, "motion is None; allowed: stop_and_go, continuous"),
-    ],
-)
+@refusals("motion", "message")
 def test_wrong_values_are_refused_with_those_that_are_allowed(motion, message):
     with pytest.raises(ConfigError, match=f"ingest of a.csv: {message}"):
         IngestSpec.from_config({"ingest": "a.csv", "motion": motion})

@@ -11,6 +11,7 @@ from rrru.robots.delta import Delta
 from rrru.robots.ptt3 import Ptt3
 from rrru.simulation.virtual_robot import VirtualRobot
 from tests.effects.robots import EFFECTS, FORWARD, ROBOT, drive, drive_error, plan_of
+from tests.refusals import refusals
 
 _OWN = """
 import numpy as np
@@ -132,29 +133,7 @@ def test_a_users_contribution_gets_its_full_shape():
             find(f"own_effects:{name}", ROBOT).contribute(motion, np.array([1e-5]))
 
 
-@pytest.mark.parametrize(
-    ("name", "message"),
-    [
-        ("slack", "unknown effect 'slack'; known: backlash, .*rail_tilt, .*, or module:object"),
-        ("own_effects:", "unknown effect"),
-        (":Creep", "unknown effect"),
-        ("./own_effects.py:Creep", "unknown effect"),
-        ("missing_effects:Creep", "cannot import 'missing_effects'"),
-        ("broken_effects:Creep", "cannot import 'broken_effects' .*nothing_of_this_name"),
-        ("own_effects:Creeps", "module own_effects has no 'Creeps'"),
-        ("own_effects:half", "lacks parameters, contribute"),
-        ("own_effects:Numbers", "parameters is no rrru.parameters.ParameterSet"),
-        ("own_effects:Usurper", "its name 'backlash' belongs to the library"),
-        ("own_effects:Weight", "its name 'weight' has another meaning"),
-        ("own_effects:Nothing", "its name 'none' has another meaning"),
-        ("own_effects:Calibration", "its name 'calibration' has another meaning"),
-        ("own_effects:Two", r"its name is 'backlash\+creep'; allowed: letters"),
-        ("own_effects:Hasty", "needs 'tme_s'; allowed: a tuple of .*time_s"),
-        ("own_effects:Text", "has needs = 'time_s', a text; allowed: a tuple"),
-        ("own_effects:Boundless", "rate has no finite bounds"),
-        ("own_effects:Choosy", "class without arguments"),
-    ],
-)
+@refusals("name", "message")
 def test_what_is_no_effect_is_refused_by_its_name(name, message):
     with pytest.raises(ConfigError, match=message):
         find(name, ROBOT)

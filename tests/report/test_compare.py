@@ -10,6 +10,7 @@ from rrru.errors import ConfigError
 from rrru.report import compare, compare_page
 from rrru.report.compare_gap import gap_difference
 from rrru.report.compare_unseen import _compared, over_runs, same_points, unseen
+from tests.refusals import refusals
 from tests.report import campaigns
 from tests.report.campaigns import ERRORS, NOMINAL, joined, leave, measured
 
@@ -160,26 +161,7 @@ def others(tmp_path_factory):
     return place
 
 
-@pytest.mark.parametrize(
-    ("first", "second", "words"),
-    [
-        ("{0}:a", "{0}:a", "A and B are both"),
-        ("{0}:a", "{0}:nobody", "has no calibrated campaign 'nobody'; it has a, b, changed"),
-        ("{0}:a", "/nowhere:a", "there is no folder /nowhere"),
-        ("{0}", "{1}/empty", "no calibrated campaign that both folders have"),
-        ("{0}:a", "{1}:other", "is of a robot rrru3, other of delta"),
-        ("{0}:a", "{1}:wide", "the nominal robots differ: a has R_mm None, wide 410.0"),
-        ("{0}:a", "{1}:lines", "no set of trajectories that both are calibrated on; a: lines, both and lines: few"),
-        (
-            "{0}:a",
-            "{1}:framed",
-            r"of framed the instrument's frame is calibrated, too \(world_x\), of a it is not",
-        ),
-        ("{0}:a", "{1}:turned", "the readings differ: of a the tool, of turned ball; allowed"),
-        ("{0}:a", "{1}:bare", "lacks verdict.json; run `snakemake` for it first"),
-        ("nothing", "{0}:a", "'nothing' is no folder, and no calibrated campaign of results"),
-    ],
-)
+@refusals("first", "second", "words")
 def test_what_cannot_be_compared_is_refused_in_words(folder, others, tmp_path, first, second, words):
     texts = [text.format(folder, others) for text in (first, second)]
     with pytest.raises(ConfigError, match=words):

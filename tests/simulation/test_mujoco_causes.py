@@ -7,6 +7,7 @@ import pytest
 from rrru.errors import ConfigError
 from rrru.robots.rrru3 import Rrru3
 from rrru.simulation import mujoco_robot
+from tests.refusals import refusals
 from tests.simulation.simulated import G, file_of, mechanism, near_home, on_line, simulated, standing
 
 _SPOTS = ((0.0, 0.0, 0.0), (60.0, 0.0, 20.0), (-40.0, 0.0, -30.0))
@@ -171,24 +172,7 @@ def test_warming_links_grow_with_time_towards_their_length():
     np.testing.assert_allclose(upper[1:], grown[1:], atol=2e-3)
 
 
-@pytest.mark.parametrize(
-    ("causes", "text"),
-    [
-        ({"wear": {"axis2": 1.0}}, "mujoco: unknown cause 'wear'; known: zero_offset, placement"),
-        ({"play": {"axis9": 1.0}}, "causes.play: 'axis9' is not a drive; allowed: axis1, axis2"),
-        ({"play": {"axis2": -1.0}}, "causes.play: axis2 is -1; allowed: a positive number"),
-        (
-            {"play_friction": {"axis2": 1.0}},
-            "play_friction: axis2 has no backlash; allowed: a drive under the key `play`",
-        ),
-        ({"clearance": {"shoulder": 1.0}}, "'shoulder' is not a hinge, ball joint or connect; allowed: axis1"),
-        ({"placement": {"elbow": 1.0}}, "'elbow' is no direction of a body; allowed: one of base_link"),
-        ({"link_stiffness": {"elbow.q": 1.0}}, "'elbow.q' is no direction of a body"),
-        ({"payload": {"hand": 1.0}}, "'hand' is not a body; allowed: base_link"),
-        ({"base_tilt": {"z": 1.0}}, "'z' is not x or y; allowed: x, y"),
-        ({"warming": {"elbow.z": 1.0}}, "causes.warming: no time_s"),
-    ],
-)
+@refusals("causes", "text")
 def test_what_does_not_fit_the_file_is_refused(causes, text):
     with pytest.raises(ConfigError, match=text.replace("(", r"\(")):
         simulated("arm6", **causes).machine()

@@ -14,6 +14,7 @@ from rrru.kinematics.base_parameters import direction
 from rrru.robots.catalogue import make_mechanism
 from tests.formats import humanoid
 from tests.places import ROOT
+from tests.refusals import refusals
 from tests.workflow.folder import run
 
 # a planar 3-RRR: three legs of two links, driven at the base, hold a plate in a plane
@@ -175,17 +176,7 @@ def test_an_arm_of_dh_rows_with_a_joint_that_follows_goes_the_whole_way(tmp_path
     assert result["error_summary"].query("mode == 'model'")["mean_mm"].max() < 0.5
 
 
-@pytest.mark.parametrize(
-    ("entry", "text"),
-    [
-        ({"module": "nothing_here:make"}, "cannot import"),
-        ({"module": "json:nothing"}, "has no 'nothing'"),
-        ({"module": "json:JSONDecoder"}, "gave a JSONDecoder"),
-        ({"urdf": "nothing.urdf"}, "nothing.urdf"),
-        ({"mjcf": "nothing.xml", "platform": "plate"}, "nothing.xml"),
-        ({"dh": [{"range_deg": [-9, 9]}, {"drives": {"q3": 1.0}}]}, "joint q2 follows 'q3'"),
-    ],
-)
+@refusals("entry", "text")
 def test_an_own_robot_that_cannot_be_made_is_refused(entry, text):
     """The message names what is missing."""
     with pytest.raises(ConfigError, match=text):

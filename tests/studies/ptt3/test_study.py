@@ -11,6 +11,7 @@ from rrru.errors import ConfigError
 from rrru.robots.catalogue import make_mechanism
 from rrru.studies.ptt3 import bench, driving, experiments, parts, results
 from rrru.studies.ptt3.learning import METHODS, learning
+from tests.refusals import refusals
 
 TRUE_MM = np.array([0.06, 0.045, 0.075])
 _ERRORS = {
@@ -81,17 +82,7 @@ def taught():
     return {name: (one, learning(one, means(one))) for name, one in every.items()}
 
 
-@pytest.mark.parametrize(
-    ("sections", "word"),
-    [
-        ({"joint": {"both": ["light", "none"]}}, "no experiment 'none'"),
-        ({"joint": {"measured": ["light", "heavy"]}}, "'measured' names two things"),
-        ({"joint": {"heavy": ["light", "heavy"]}}, "'heavy' names two things"),
-        ({"network": {"train": 100}}, "ptt.network.train is 100"),
-        ({"bench": {"lead_mm": 60.0}}, "is 360 mm; allowed: up to range_mm, 300 mm"),
-        ({"robot": {"effects": {"axis_tilt": {}}}}, "'axis_tilt'"),
-    ],
-)
+@refusals("sections", "word")
 def test_what_does_not_fit_together_is_refused(sections, word):
     parts.check(SETTINGS)
     parts.check_robot(SETTINGS)

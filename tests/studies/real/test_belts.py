@@ -8,6 +8,7 @@ from rrru.calibration.lengths import fit_lengths, refit
 from rrru.errors import ConfigError, FitError, IngestError
 from rrru.studies.real import belts, figures_lengths
 from rrru.studies.real.lengths_section import Section
+from tests.refusals import refusals
 from tests.studies.real import simulated_lengths as simulated
 
 MASLOW = {
@@ -93,21 +94,7 @@ def test_metres_and_a_held_out_column():
     assert small["real_points"]["row"].nunique() == len(frame)
 
 
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"lengths": {"a": "a_mm", "b": "b_mm"}}, "at least 3 belts"),
-        ({"lengths": {}}, "lengths: got {}"),
-        ({"heights_mm": {"z": 3.0}}, "got 'z'; allowed: one of a, b, c, d"),
-        ({"heights_mm": {"a": -3.0}}, "heights_mm.a: got -3.0"),
-        ({"heights_mm": {"a": "high"}}, "heights_mm.a: got 'high'"),
-        ({"unit": "yards"}, "unit: got 'yards'; allowed: mm, m, inch"),
-        ({"dimensions": 4}, "dimensions: got 4"),
-        ({"dimensions": 3}, "nothing where dimensions is 3"),
-        ({"hights_mm": {}}, "unknown key 'hights_mm'"),
-        ({"row": "number"}, "row: got 'number'"),
-    ],
-)
+@refusals("change", "message")
 def test_wrong_section_is_refused(change, message):
     frame, section, _ = simulated.belts(0)
     with pytest.raises(ConfigError, match=r"real\.sets\.mine") as error:

@@ -7,6 +7,7 @@ from rrru.calibration.lengths import fit_lengths
 from rrru.errors import ConfigError, IngestError
 from rrru.studies.real import cables
 from rrru.studies.real.lengths_section import Section
+from tests.refusals import refusals
 from tests.studies.real import simulated_lengths as simulated
 
 SECTION = simulated.CABLES
@@ -53,20 +54,7 @@ def test_degrees_and_millimetres():
     np.testing.assert_allclose(_value(found, "a1_x"), _value(expected, "a1_x"), rtol=1e-5)
 
 
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"distances": [[1, 1, 0, 0]]}, "3 rows, one per drum, of 4 numbers"),
-        ({"distances": [[1, 1, 0, 0], [1, 0, 0, 0], [0, 1, 0, 2]]}, "at least one cable that runs to a3"),
-        ({"distances": [[0, 0, 0, 0], [1, 0, 2, 0], [0, 1, 0, 2]]}, "the cable of drum1"),
-        ({"distances": [[1, 1, 0, "x"], [1, 0, 2, 0], [0, 1, 0, 2]]}, "distances: got 'x'"),
-        ({"drums": {"drum1": {"column": "drum1_rad"}}}, "a mapping of column and radius_mm"),
-        ({"drums": {"drum1": {"column": "drum1_rad", "radius_mm": -2.0}}}, "drums.drum1.radius_mm: got -2.0"),
-        ({"anchors": ["a1", "a1"]}, "different names"),
-        ({"position": ["x_m"]}, "two or three columns"),
-        ({"angle_unit": "turns"}, "angle_unit: got 'turns'"),
-    ],
-)
+@refusals("change", "message")
 def test_wrong_section_is_refused(change, message):
     frame, _ = simulated.cables(0)
     with pytest.raises(ConfigError) as error:

@@ -4,6 +4,7 @@ import pytest
 
 from rrru.errors import ConfigError
 from rrru.studies.real import series
+from tests.refusals import refusals
 from tests.studies.real import simulated_arm
 
 ROBOTS = {"arm": simulated_arm.robot(), "rrru3": {"L1_mm": 400.0}}
@@ -53,16 +54,7 @@ def test_a_folder_that_is_none_has_no_files_and_says_so(tmp_path, monkeypatch, f
     assert f"{tmp_path / folder} or" in series.missing(real, "mine") and series.VARIABLE in series.missing(real, "mine")
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("", "No columns"),
-        ("\n\n", "No columns"),
-        ("J1,X\n", "has no rows"),
-        ("J1,X,X\n1,2,3\n", "two columns 'X'"),
-        ("J1,X\n1,2\n1,2,3,4\n", "line 3"),
-    ],
-)
+@refusals("text", "message")
 def test_files_that_cannot_be_read_are_named(tmp_path, text, message):
     with pytest.raises(ConfigError, match=r"real\.sets\.mine: .*log_x\.csv") as error:
         _written(tmp_path, text).read()
@@ -92,24 +84,7 @@ def test_a_set_is_taken_out_by_null(tmp_path):
         series.check({"real": {"sets": {"other": None}}, "robots": ROBOTS})
 
 
-@pytest.mark.parametrize(
-    ("changes", "message"),
-    [
-        ({"files": "/tmp/x*.csv"}, "files: got '/tmp/x"),
-        ({"files": "../x*.csv"}, "below the folder"),
-        ({"files": "a*/x.csv"}, "one \\* in the file's name"),
-        ({"files": "a/x*_*.csv"}, "one \\* in the file's name"),
-        ({"files": "a/x[1].csv"}, "one \\* in the file's name"),
-        ({"robot": "unknown"}, "robot: got 'unknown'; allowed: .*: arm"),
-        ({"robot": "rrru3"}, "robot: got 'rrru3'; allowed: .*: arm"),
-        ({"chain": "chain.json"}, "got both robot and chain"),
-        ({"world_targets": ["table"]}, "world_targets: got 'table'; allowed: keys of readings: tcp"),
-        ({"world_targets": ["tcp"]}, "world_targets: got all of readings"),
-        ({"joints": {"q1_rad": "J1", "q2_rad": "J1"}}, "joints: got 'J1' twice"),
-        ({"readings": {"tcp": {"position": ["X", "Y", "Y"]}}}, "readings.tcp: got 'Y' twice"),
-        ({"variants": {"read": {"joints": {"q1_rad": "J1", "q2_rad": "J1"}}}}, "variants.read.joints: got 'J1' twice"),
-    ],
-)
+@refusals("changes", "message")
 def test_sections_that_do_not_fit_are_refused(tmp_path, changes, message):
     with pytest.raises(ConfigError, match=rf"real\.sets\.mine.*{message}"):
         series.check({"real": _real(tmp_path, **changes), "robots": ROBOTS})
