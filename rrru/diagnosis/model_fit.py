@@ -18,7 +18,7 @@ from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.payload_nuisance import WEIGHT
 from rrru.diagnosis.problem import GEOMETRY
 from rrru.diagnosis.state import State
-from rrru.diagnosis.terms import EffectTerm, spread
+from rrru.diagnosis.terms import EACH, EffectTerm, spread
 from rrru.diagnosis.whitened import discrepancy_scales, spectrum
 from rrru.effects.protocol import Contribution, is_compliant
 from rrru.errors import FitError
@@ -158,7 +158,8 @@ class EffectModel:
             made = [
                 f[case.at][:, None, :] * response[:, :, k, None] for k, f in enumerate(effect_functions(case.motion))
             ]
-            return np.concatenate(made, axis=-1) @ matrix
+            together = np.concatenate(made, axis=-1)
+            return together if term.legs == EACH else together @ matrix
         contribution = case.contributions(state)[key]
         result = np.empty((len(case), 3, matrix.shape[1]))
         for k, column in enumerate(matrix.T):
