@@ -33,10 +33,10 @@ _LEAST_MM = 30.0
 
 @dataclass(frozen=True)
 class LinkWeights:
-    """Parameters of the weight on each drive of an arm.
+    """Parameters of the weight on each drive of an arm, whose drive k moves link k and all behind it.
 
     joints (K,): number in the leg of each drive's joint; columns: by drive the numbers of its own, three a link behind
-    the joint; moments (J,): assumed moments of the links in kg mm.
+    its joint; moments (K,): assumed moments of the links in kg mm.
     """
 
     robot: object
@@ -46,7 +46,7 @@ class LinkWeights:
 
     def parameters(self, drive):
         """Parameters of a drive, counted from 0, and their typical sizes (c,) in rad."""
-        named = [(self.joints[drive] + column // 3, "xyz"[column % 3]) for column in self.columns[drive]]
+        named = [(drive + column // 3, "xyz"[column % 3]) for column in self.columns[drive]]
         parameters = [
             Parameter(
                 f"weight{drive + 1}_link{link + 1}_{axis}", "rad", 0.0, -_MOST_RAD, _MOST_RAD, "assumed", drive + 1
@@ -58,7 +58,8 @@ class LinkWeights:
     def functions(self, motion):
         """By drive the deflections (n, c) under a unit of each of its parameters along a Motion."""
         at = self.robot.map_at(motion.drive, motion.position_mm)
-        return [_columns(self.robot, at, joint)[:, own] for joint, own in zip(self.joints, self.columns, strict=True)]
+        every = _columns(self.robot, at, self.joints)
+        return [columns[:, own] for columns, own in zip(every, self.columns, strict=True)]
 
 
 def link_weights(robot):
@@ -74,8 +75,8 @@ def link_weights(robot):
     # anywhere in the ranges, always the same poses
     drives = np.random.default_rng(0).uniform(low, high, (_POSES, len(low)))
     at = robot.map_at(drives, robot.guess(drives))
-    columns = [_independent(_columns(robot, at, joint)) for joint in joints]
-    return LinkWeights(robot, joints, columns, _moments(robot, at))
+    columns = [_independent(of_drive) for of_drive in _columns(robot, at, joints)]
+    return LinkWeights(robot, joints, columns, _moments(robot, at, joints))
 
 
 def _frames(robot, at):
@@ -86,16 +87,20 @@ def _frames(robot, at):
     return np.concatenate([turns, at.poses.turn[None]]), np.concatenate([places, at.poses.position_mm[None]])
 
 
-def _columns(robot, at, joint):
-    """Functions (n, 3 links): what a unit of each component of each link behind a joint adds to its value.
+def _columns(robot, at, joints):
+    """By drive the functions (n, 3 links): what each component of each link behind its joint adds to its value.
 
-    The frame of the next joint is fixed in a link; that of the joint itself does not turn with it.
+    The frame after a joint is fixed in its link; that of the joint itself does not turn with it.
     """
     (leg,) = robot.legs.legs
     turns, _ = _frames(robot, at)
-    # z . (u x R e) = R e . (z x u)
-    lever = np.cross(turns[joint] @ leg.joints[joint].axis, robot.up)
-    return np.concatenate([np.einsum("na,nac->nc", lever, turn) for turn in turns[joint + 1 :]], axis=1)
+    result = []
+    for drive, joint in enumerate(joints):
+        # z . (u x R e) = R e . (z x u)
+        lever = np.cross(turns[joint] @ leg.joints[joint].axis, robot.up)
+        behind = [np.einsum("na,nac->nc", lever, turns[other + 1]) for other in joints[drive:]]
+        result.append(np.concatenate(behind, axis=1))
+    return result
 
 
 def _independent(columns):
@@ -105,10 +110,11 @@ def _independent(columns):
     return np.sort(order[: int((size > _NONE * np.sqrt(len(columns))).sum())])
 
 
-def _moments(robot, at):
-    """Assumed moments (J,) in kg mm of each link and of all that hangs on its end."""
+def _moments(robot, at, joints):
+    """Assumed moments (K,) in kg mm of each link and of all that hangs on its end."""
     _, places = _frames(robot, at)
-    length = np.maximum(np.median(np.linalg.norm(np.diff(places, axis=0), axis=2), axis=1), _LEAST_MM)
+    along = np.diff(places[[*joints, -1]], axis=0)
+    length = np.maximum(np.median(np.linalg.norm(along, axis=2), axis=1), _LEAST_MM)
     mass = _KG_PER_MM * length
     behind = np.append(np.cumsum(mass[::-1])[::-1], 0.0)[1:]
     return length * (0.5 * mass + behind)
