@@ -38,21 +38,22 @@ def per_leg(effect):
     return bool((effect.coordinates.legs > 0).all())
 
 
-def one_value_for_all(effect):
-    """Whether an effect may have one value for all legs.
-
-    That is for coordinates that cannot be negative: sizes of one design, unlike the signed errors of an assembly, and
-    unlike the joints of an arm.
-    """
-    return per_leg(effect) and effect.coordinates.alike and bool(effect.coordinates.positive.all())
+def legs_alike(effect):
+    """Whether an effect has the same number of coordinates on each leg, so that legs may share values."""
+    legs = effect.coordinates.legs
+    return per_leg(effect) and len(np.unique(np.unique(legs, return_counts=True)[1])) == 1
 
 
 def variants(effect):
-    """All terms of an effect: each shape with each choice of legs that makes a difference."""
+    """All terms of an effect: each shape with each choice of legs that makes a difference.
+
+    One value for all legs is tried for coordinates that cannot be negative: sizes of one design, unlike the signed
+    errors of an assembly, and unlike the joints of an arm.
+    """
     coordinates, legs = effect.coordinates, per_leg(effect)
     choices = (
         EACH,
-        *((SAME,) if one_value_for_all(effect) else ()),
+        *((SAME,) if legs_alike(effect) and coordinates.alike and coordinates.positive.all() else ()),
         *(np.unique(coordinates.legs).tolist() if legs else ()),
     )
     return tuple(EffectTerm(effect.name, shape, legs) for shape in range(len(coordinates.shapes)) for legs in choices)

@@ -12,7 +12,7 @@ import numpy as np
 from rrru.campaign.noise import along_runs
 from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.payload_nuisance import WEIGHT
-from rrru.diagnosis.terms import EACH, SAME, one_value_for_all, spread
+from rrru.diagnosis.terms import EACH, SAME, legs_alike, spread
 from rrru.estimation.noise_model import NoiseModel, lengths
 
 DISCREPANCY_SCALES = np.array([0.0, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1000.0])
@@ -66,7 +66,7 @@ class Whitened:
         numbers = {key: np.arange(first, first + size) for (key, size), first in zip(blocks, ends, strict=False)}
         made = [np.zeros((ends[-1], 0))]
         for name, shape in linear.columns:
-            if one_value_for_all(self.library[name]):
+            if legs_alike(self.library[name]):
                 of_legs, sums = numbers[name, shape, EACH], spread(self.library[name].coordinates, SAME)
                 numbers[name, shape, SAME] = ends[-1] + sum(part.shape[1] for part in made) + np.arange(sums.shape[1])
                 made.append(np.zeros((ends[-1], sums.shape[1])))
