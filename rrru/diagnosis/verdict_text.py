@@ -10,6 +10,7 @@ from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.result_notes import MASSES_UNKNOWN, REPEATABILITY_UNKNOWN
 from rrru.diagnosis.verdict import NOT_TESTED, POSSIBLE
 from rrru.effects.causes import cause_texts
+from rrru.effects.protocol import is_per_load
 from rrru.robots.drive_words import DriveWords
 
 SCHEMA = 1
@@ -355,7 +356,7 @@ def _cause(effect, follow, with_shares, facts):
     # several have their numbers in the table
     place = f" {effect['place']}" if effect["legs"].isdigit() else ""
     parameters = effect["parameters"]
-    per_load = [number for number in parameters if _per_load(number["unit"])]
+    per_load = [number for number in parameters if is_per_load(number["unit"])]
     massless = MASSES_UNKNOWN in facts["notes"] and bool(per_load)
     if massless:
         # only where the weight of the links has parameters of its own is a compliance not a multiple of it
@@ -367,11 +368,6 @@ def _cause(effect, follow, with_shares, facts):
     meaning = f": {effect['meaning']}" if effect["meaning"] else ""
     said = f"{share} {readable(effect['name'])}{place}{size}{meaning}.{_worst(effect['worst_places'])}"
     return f"{said} {_NO_SIZE}" if unsized else said
-
-
-def _per_load(unit):
-    """Whether a parameter of this unit is a compliance: per newton, or per torque."""
-    return "/N" in unit or "(N" in unit
 
 
 def _worst(places):
@@ -391,7 +387,7 @@ def _sizes(parameters):
     for row in parameters:
         # a compliance that may be zero is not found: its part has little load, or none that varies
         least, (low, high) = OPTIONS.min_compliance_ratio * abs(row["value"]), (row["low_95"], row["high_95"])
-        found = not _per_load(row["unit"]) or low > least or high < -least
+        found = not is_per_load(row["unit"]) or low > least or high < -least
         if found and np.isfinite(row["standard_error"] or np.nan):
             unit, factor = _READABLE.get(row["unit"], (row["unit"], 1.0))
             size = with_interval(*(factor * row[key] for key in ("value", "low_95", "high_95")), unit)

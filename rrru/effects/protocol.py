@@ -327,7 +327,12 @@ def bears_load(effect: Any) -> bool:
 
 def is_compliance(effect: Any) -> bool:
     """Whether an effect depends on the loads, or on weights that it has as parameters in their place."""
-    return bears_load(effect) or any("N" in parameter.unit for parameter in effect.parameters)
+    return bears_load(effect) or any(is_per_load(parameter.unit) for parameter in effect.parameters)
+
+
+def is_per_load(unit: str) -> bool:
+    """Whether a parameter of this unit is a compliance: per newton, or per torque."""
+    return "/N" in unit or "(N" in unit
 
 
 def is_compliant(effect: Any) -> bool:

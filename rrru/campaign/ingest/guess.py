@@ -145,13 +145,8 @@ def axis_triples(names):
     """[{x: .., y: .., z: ..}] of columns whose names differ in the axis alone, of whatever they are."""
     triples = {}
     for name in names:
-        words = _plain(name).split()
-        for place in (-1, 0):
-            axis = _GEODETIC.get(words[place], words[place]) if words else ""
-            if axis in ("x", "y", "z"):
-                stem = " ".join(words[:-1] if place else words[1:])
-                triples.setdefault((stem, place), {}).setdefault(axis, name)
-                break
+        for place, stem, axis in _axes_in(name)[:1]:
+            triples.setdefault((stem, place), {}).setdefault(axis, name)
     return [axes for axes in triples.values() if set(axes) == set("xyz")]
 
 
@@ -171,15 +166,16 @@ def _measured_by_an_instrument(free):
 
 def _instrument_axis(name):
     """The words of an instrument or of its reflector in a column's name, and its axis; "" and "" for other names."""
+    found = _axes_in(name)
+    return next(((stem, axis) for _, stem, axis in found if re.sub(r"\d+", "", stem).strip() in _INSTRUMENTS), ("", ""))
+
+
+def _axes_in(name):
+    """[(place, other words, axis)] of an axis as the last (place -1) or the first (0) word of a column's name."""
     words = _plain(name).split()
-    for place in (-1, 0):
-        if len(words) > 1:
-            axis = _GEODETIC.get(words[place], words[place])
-            stem = words[:-1] if place else words[1:]
-            bare = re.sub(r"\d+", "", " ".join(stem)).strip()
-            if axis in ("x", "y", "z") and bare in _INSTRUMENTS:
-                return " ".join(stem), axis
-    return "", ""
+    ends = ((place, words[:-1] if place else words[1:], words[place]) for place in (-1, 0) if words)
+    found = [(place, " ".join(stem), _GEODETIC.get(word, word)) for place, stem, word in ends]
+    return [one for one in found if one[2] in ("x", "y", "z")]
 
 
 def _numbered(drives, found, free):
