@@ -11,7 +11,7 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
-from scipy.linalg import block_diag
+from scipy.linalg import block_diag, qr
 from scipy.optimize import minimize_scalar
 from scipy.special import gammaln
 
@@ -194,9 +194,9 @@ def resolved(effect, motion):
         most = np.max([size[k] / size[k].max() for size in sizes], axis=0)
         scaled = functions * most
         power, turned = np.linalg.eigh(scaled.T @ scaled)
-        kept = turned[:, power > _LEAST_POWER * power[-1]][:, ::-1]
-        mixtures.append(most[:, None] * kept)
-        roots.append([_root(kept.T * _rounded(size[k] / most) ** 2 @ kept) for size in sizes])
+        seen = _canonical(turned[:, power > _LEAST_POWER * power[-1]])
+        mixtures.append(most[:, None] * seen)
+        roots.append([_root(seen.T * _rounded(size[k] / most) ** 2 @ seen) for size in sizes])
     return _mixed(effect, mixtures, {"spectra": (), "roots": tuple(zip(*roots, strict=True))})
 
 
@@ -206,14 +206,25 @@ def _rounded(sizes):
 
 
 def _root(covariance):
-    """A matrix (c, r) with root @ root.T equal to a covariance (c, c) but for rounding, columns by their size."""
+    """A matrix (c, r) with root @ root.T equal to a covariance (c, c) within rounding."""
     variance, turned = np.linalg.eigh(covariance)
-    kept = variance > _LEAST_POWER * variance[-1]
-    return (turned[:, kept] * np.sqrt(variance[kept]))[:, ::-1]
+    free = variance > _LEAST_POWER * variance[-1]
+    return turned[:, free] * np.sqrt(variance[free])
+
+
+def _canonical(root):
+    """The root (c, r) of a covariance that does not depend on rounding, as eigenvectors of equal values do."""
+    # pivoted Cholesky factor; of pivots that are alike, the first one
+    preferred = 1.0 - 1e-6 * np.arange(len(root)) / len(root)
+    pivots = qr(root.T * preferred, mode="r", pivoting=True)[1]
+    triangle = qr(root.T[:, pivots], mode="economic")[1]
+    result = np.empty_like(root)
+    result[pivots] = (triangle * np.where(np.diag(triangle) < 0.0, -1.0, 1.0)[:, None]).T
+    return result
 
 
 def _mixed(effect, by_drive, changes):
-    """An effect whose coordinates stand for mixtures (c_k, r_k), by drive, of its own; changes: of its Coordinates."""
+    """An effect with mixtures (c_k, r_k), by drive, of its coordinates; changes: of the Coordinates otherwise."""
     before, functions = effect.coordinates, effect.along_drives
     mixture, count = block_diag(*by_drive), [its.shape[1] for its in by_drive]
     after = replace(
@@ -239,9 +250,9 @@ def _visible(columns, by_drive, size):
     for own, root in zip(np.split(columns, ends, axis=1), by_drive, strict=True):
         made = own @ root
         power, turned = np.linalg.eigh(made.T @ made)
-        kept = np.maximum(power, 0.0) * size**2 > OPTIONS.min_function_power_per_noise
-        kept[-1] = True
-        result.append(root @ turned[:, kept][:, ::-1])
+        shows = np.maximum(power, 0.0) * size**2 > OPTIONS.min_function_power_per_noise
+        shows[-1] = True
+        result.append(_canonical(root @ turned[:, shows]))
     return result
 
 

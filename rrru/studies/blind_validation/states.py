@@ -53,5 +53,5 @@ def state_of(row, library):
 
 
 def _saved(coordinates, value):
-    """Values of an effect's coordinates; of coordinates that a campaign has chosen, of those that they stand for."""
+    """Values of an effect's coordinates; of mixtures that a campaign has chosen, of the effect as the library has it."""
     return np.asarray(coordinates.to_values(value, coordinates.shapes[0]) if coordinates.sized else value)

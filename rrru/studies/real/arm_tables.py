@@ -183,7 +183,8 @@ def _spectrum(studied: Studied) -> pd.DataFrame:
             errors = studied.diagnosis.tables["gap_parameters"]
             errors = errors.loc[errors["effect"] == _FUNCTION[0], "standard_error"].to_numpy()
             shape = len(robot.parts.drives), -1, 2
-            waves = np.reshape(found, shape)[number, : len(orders)]
+            values = case.library[_FUNCTION[0]].coordinates.to_values(found, {})
+            waves = np.reshape(values, shape)[number, : len(orders)]
             error[: len(waves)] = np.reshape(errors, shape)[number, : len(orders)].mean(axis=1)
             sine[: len(waves)], cosine[: len(waves)] = waves.T
         reach = float(np.ptp(case.motion.drive[case.used][:, number]))

@@ -143,7 +143,7 @@ def test_states_survive_as_text():
             ("thermal_growth", 2): np.array([1.25e-4]),
             ("backlash", 0): np.array([0.0, 1 / 3, 2.0]),
             ("transmission_orders", 0): np.array([1e-4, -2e-4]),
-            ("drive_error_function", 0): 1e-5 * np.arange(3 * 2 * 7),
+            ("drive_error_function", 0): 1e-5 * np.arange(3 * 2 * 128),
         },
         {"thermal_growth": {"time_constant": 1 / 7}},
     )
@@ -155,7 +155,22 @@ def test_states_survive_as_text():
     assert all((again.effects[key] == value).all() for key, value in state.effects.items())
     assert effects["transmission_orders"].waves == ((2, 7.25),)
     assert effects["transmission_orders"].parameters.names == ("sine_3_7.25", "cosine_3_7.25")
-    assert len(effects["drive_error_function"].coordinates) == 3 * 2 * 7 and effects["backlash"] is _LIBRARY["backlash"]
+    assert all(effects[name] is _LIBRARY[name] for name in ("drive_error_function", "backlash"))
+
+
+def test_a_function_of_the_measured_range_survives_as_its_coefficients(robots):
+    """Mixtures that a campaign has chosen come back as the library's coefficients, with the same curves."""
+    case, name = _case(robots["sound"][1], _LIBRARY), "drive_error_function"
+    mixed = case.library[name]
+    chosen = replace(mixed, coordinates=replace(mixed.coordinates, sized=True))
+    values = 1e-5 * np.random.default_rng(4).standard_normal(len(mixed.coordinates))
+    state = State(np.zeros(2), {(name, 0): values})
+    _, again, effects = state_of(state_row("a", [0.0], state, {name: chosen}), _LIBRARY)
+    assert effects[name] is _LIBRARY[name] and len(again.effects[name, 0]) > len(values)
+    found = _LIBRARY[name].along_drives(case.motion), np.split(again.effects[name, 0], 3)
+    for drive, (own, every, coefficients) in enumerate(zip(mixed.along_drives(case.motion), *found, strict=True), 1):
+        curve = own @ values[mixed.coordinates.legs == drive]
+        np.testing.assert_allclose(every @ coefficients, curve, rtol=0.0, atol=1e-12 * np.abs(curve).max())
 
 
 def test_the_oracle_alarms_falsely_once_in_a_hundred(robots):
