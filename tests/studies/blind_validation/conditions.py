@@ -16,4 +16,4 @@ CONDITIONS = Conditions(_MECHANISM, _MOTION, Masses(), 0.02, 2021)
 
 def bare(number, kind="paper", name="bare"):
     """A robot that deviates from the nominal one, and nothing more."""
-    return replace(draw.bare(name, np.random.default_rng(number), CONDITIONS.mechanism), kind=kind)
+    return replace(draw.bare(name, np.random.default_rng(number), CONDITIONS), kind=kind)

@@ -17,12 +17,11 @@ from rrru.robots.catalogue import make_mechanism
 from rrru.seeds import stream
 from rrru.simulation.virtual_robot import VirtualRobot
 from rrru.studies.blind_validation import draw
+from rrru.studies.blind_validation.causes import EFFECTS, OUTSIDE
 from rrru.studies.blind_validation.chunks import Member, check, chunks, noise_of
-from rrru.studies.blind_validation.members import robot_of
 from rrru.studies.blind_validation.noise import NOISES, NoiseModel
-from rrru.studies.blind_validation.oracle import limits, with_truth
-from rrru.studies.blind_validation.outside import EFFECTS, OUTSIDE
-from rrru.studies.blind_validation.robots import noise_free, true_gap_mm
+from rrru.studies.blind_validation.robots import noise_free, robot_of, true_gap_mm
+from rrru.studies.blind_validation.score import limits, with_truth
 from rrru.studies.blind_validation.verdicts import PLANTS
 from tests.studies.blind_validation.conditions import CONDITIONS, bare
 
@@ -88,7 +87,7 @@ def test_one_leg_means_that_leg_alone():
 
 def test_truths_come_in_the_stated_shares(monkeypatch):
     drawn = Counter()
-    monkeypatch.setattr(draw, "_trajectories", lambda *_: {})
+    monkeypatch.setattr(draw, "draw_trajectories", lambda *_: {})
     monkeypatch.setattr(draw, "true_gap_mm", lambda *_: 1.0)
     monkeypatch.setattr(draw, "draw_acting", lambda robot, name, *_: name)
     effects, kinds = Counter(), Counter()
@@ -186,7 +185,7 @@ def test_the_laws_from_outside_do_as_they_say():
 
 def test_robots_as_they_are_have_one_to_six_causes_and_noise_that_is_not_as_stated(monkeypatch):
     """Names and noises alone: what acts is not simulated."""
-    monkeypatch.setattr(draw, "_trajectories", lambda *_: {})
+    monkeypatch.setattr(draw, "draw_trajectories", lambda *_: {})
     monkeypatch.setattr(draw, "true_gap_mm", lambda *_: 1.0)
     spans = set()
 
@@ -232,7 +231,7 @@ def test_causes_of_a_robot_as_they_are_are_as_strong_as_they_say():
 def _count(number):
     """How many effects of the library act in a 3-RRRU as it is, from what is drawn before them."""
     generator = stream(CONDITIONS.seed, "withheld", "as_robots_are", number)
-    robot = draw.bare("", generator, _MECHANISM)
+    robot = draw.bare("", generator, replace(CONDITIONS, mechanism=_MECHANISM))
     draw.with_background(robot, generator, CONDITIONS)
     draw.noise_not_as_stated(generator)
     return draw.count_of_causes(generator)
@@ -309,4 +308,4 @@ def test_files_that_the_check_has_no_places_in_are_refused(file, message):
 def test_dimensions_without_room_for_the_trajectories_are_refused(dimensions, reason):
     small = make_mechanism("rrru3", dimensions)
     with pytest.raises(ConfigError, match=rf"robots\.rrru3: of 200 drawn trajectories .* 200 are {reason}; allowed: "):
-        draw.bare("small", np.random.default_rng(0), small)
+        draw.bare("small", np.random.default_rng(0), replace(CONDITIONS, mechanism=small))

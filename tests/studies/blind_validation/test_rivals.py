@@ -14,9 +14,9 @@ from rrru.diagnosis.diagnose import MeasuredRobot
 from rrru.diagnosis.settings import GapSettings
 from rrru.diagnosis.terms import EffectTerm
 from rrru.studies.blind_validation import draw, rivals
-from rrru.studies.blind_validation.beliefs import beliefs
 from rrru.studies.blind_validation.chunks import chunks, rivalled
-from rrru.studies.blind_validation.methods import compare
+from rrru.studies.blind_validation.rivals import beliefs
+from rrru.studies.blind_validation.summary import compare_methods
 from rrru.studies.blind_validation.verdicts import in_order
 from tests.schemas import check
 from tests.studies.blind_validation.conditions import CONDITIONS, bare
@@ -148,7 +148,7 @@ def test_answers_are_scored_against_the_truth():
         _row("diagnosis", "c", "backlash", {"backlash": 1.0}, 0.1, 3.0),
         _row("gaussian_process", "a", "", {}, 0.4),
     ]
-    table = check("withheld_methods", compare(pd.DataFrame(said), answers)).set_index("method")
+    table = check("withheld_methods", compare_methods(pd.DataFrame(said), answers)).set_index("method")
     own = table.loc["diagnosis"]
     assert own["robots"] == 3 and own["seconds"] == 2.0
     np.testing.assert_allclose(own["right"], 2.0 / 3.0)

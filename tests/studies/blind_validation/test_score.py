@@ -14,14 +14,19 @@ from rrru.diagnosis.state import State
 from rrru.effects.library import library
 from rrru.errors import ConfigError
 from rrru.studies.blind_validation import draw
-from rrru.studies.blind_validation.field import field_verdicts, read_field_answers, score_field
-from rrru.studies.blind_validation.members import Known
-from rrru.studies.blind_validation.oracle import limits, with_truth
-from rrru.studies.blind_validation.outside import EFFECTS
+from rrru.studies.blind_validation.causes import EFFECTS
 from rrru.studies.blind_validation.robots import noise_free
-from rrru.studies.blind_validation.score import _rivals, score_chunk
-from rrru.studies.blind_validation.states import state_of, state_row
-from rrru.studies.blind_validation.summary import calibration_error, confusion, summary, wilson
+from rrru.studies.blind_validation.score import Known, _rivals, limits, score_chunk, with_truth
+from rrru.studies.blind_validation.stated import state_of, state_row
+from rrru.studies.blind_validation.summary import (
+    calibration_error,
+    confusion,
+    field_verdicts,
+    read_field_answers,
+    score_field,
+    summary,
+    wilson,
+)
 from rrru.studies.blind_validation.verdicts import is_right
 from tests.schemas import TABLES, check
 from tests.studies.blind_validation.conditions import CONDITIONS, bare

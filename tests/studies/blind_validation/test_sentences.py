@@ -362,8 +362,8 @@ def test_every_kind_is_the_robot_that_its_file_says(tmp_path):
 def test_files_are_read_again_without_the_package(tmp_path, kind, form):
     from types import SimpleNamespace
 
-    from rrru.studies.blind_validation.sentences.files import file_poses
     from rrru.studies.blind_validation.sentences.kinds import KINDS
+    from rrru.studies.blind_validation.sentences.truth import file_poses
 
     robot = KINDS[kind](np.random.default_rng(2))
     values = robot.spans.mean(axis=1) + 0.2 * np.random.default_rng(5).uniform(-1, 1, (4, len(robot.units))) * np.ptp(
@@ -382,20 +382,19 @@ def test_mujoco_drives_what_numpy_says(monkeypatch):
     """Without errors of its seats a gantry stands where its drives are, and lags by half its play."""
     from dataclasses import replace
 
-    from rrru.studies.blind_validation.sentences import driven
+    from rrru.studies.blind_validation.sentences import draws
     from rrru.studies.blind_validation.sentences.causes import Cause, Stops
-    from rrru.studies.blind_validation.sentences.draws import draw
 
-    monkeypatch.setattr(driven, "_LENGTH_MM", 0.0)
-    monkeypatch.setattr(driven, "_ANGLE_RAD", 0.0)
-    own = draw(9, 8, 60, 1.0)
+    monkeypatch.setattr(draws, "_LENGTH_MM", 0.0)
+    monkeypatch.setattr(draws, "_ANGLE_RAD", 0.0)
+    own = draws.draw(9, 8, 60, 1.0)
     assert own.plant == "mujoco" and own.robot_kind == "gantry3"
     drive = np.array([[0.0, 0.0, 0.0], [30.0, -20.0, 25.0], [10.0, 5.0, 5.0]])
     stops = Stops(drive, np.zeros(3), np.arange(3.0), np.zeros(3, dtype=bool))
     own = replace(own, stops=stops, cause=Cause("backlash", (0.3, 0.2, 0.0)))
     lagged = own.cause.at_drives(own.nominal, stops)
     np.testing.assert_allclose(lagged[1:], [[-0.15, 0.1, 0.0], [0.15, -0.1, 0.0]])
-    found = driven.driven(own)
+    found = draws.driven(own)
     for acts, off in ((False, 0.0), (True, lagged)):
         place, _ = own.nominal.poses(drive + own.zeros + off)
         # friction and the weight of what hangs on a servo leave some micrometres

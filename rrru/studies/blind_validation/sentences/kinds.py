@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from rrru.studies.blind_validation.sentences.chains import Chain, Joint
-from rrru.studies.blind_validation.sentences.rods import Rods
+from rrru.studies.blind_validation.sentences.own_robots import Chain, Joint, Rods
 
 _X, _Y, _Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 _AXES = {"x": _X, "y": _Y, "z": _Z}

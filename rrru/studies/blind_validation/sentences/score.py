@@ -11,7 +11,7 @@ from rrru.errors import RrruError, SimulationError, UnreachableError
 from rrru.studies.blind_validation.chunks import MISTAKES, PAGES, RIGHT
 from rrru.studies.blind_validation.sentences import mistakes, page
 from rrru.studies.blind_validation.sentences.claims import UNKNOWN, claims
-from rrru.studies.blind_validation.sentences.draws import draw
+from rrru.studies.blind_validation.sentences.draws import draw, driven
 from rrru.studies.blind_validation.sentences.judge import KINDS, judge
 from rrru.studies.blind_validation.sentences.truth import truth_of
 
@@ -68,9 +68,6 @@ def _driven(number, settings):
     """The Draw of a number, simulated with NumPy where MuJoCo cannot drive it."""
     own = draw(number, settings["seed"], settings["stops"], settings["mujoco_share"])
     if own.plant == "mujoco":
-        # a large import that most robots do not need
-        from rrru.studies.blind_validation.sentences.driven import driven
-
         try:
             return driven(own)
         except (SimulationError, UnreachableError):
