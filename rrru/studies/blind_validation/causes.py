@@ -168,6 +168,11 @@ def _draw_sizes(typical, positive, generator):
     return np.where(positive, np.abs(sizes), sizes)
 
 
+def draw_log_uniform(span, generator):
+    """A positive number from a span, its logarithm uniform."""
+    return float(np.exp(generator.uniform(*np.log(span))))
+
+
 def _draw_value(tried, generator):
     """A value of a shape: one of at most two grid values of the library, else between its smallest and largest one."""
     known = sorted({float(value) for value in tried})
@@ -175,7 +180,7 @@ def _draw_value(tried, generator):
     if len(known) <= 2:
         return float(generator.choice(known))
     if low > 0.0:
-        return float(np.exp(generator.uniform(*np.log([low, high]))))
+        return draw_log_uniform((low, high), generator)
     return float(generator.uniform(low, high))
 
 

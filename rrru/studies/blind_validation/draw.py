@@ -25,6 +25,7 @@ from rrru.studies.blind_validation.causes import (
     Fault,
     draw_direction,
     draw_fault,
+    draw_log_uniform,
     drawn_effects,
     kind_of,
     kinds_of,
@@ -214,7 +215,7 @@ def draw_acting(robot, name, single, span, generator, conditions):
     """
     coordinates = CAUSES[name].coordinates
     for _ in range(DRAWS):
-        strength = float(np.exp(generator.uniform(*np.log(span))))
+        strength = draw_log_uniform(span, generator)
         for _ in range(DRAWS):
             acting = draw_direction(name, coordinates, single, strength, generator)
             acting = _to_strength(robot, acting, conditions)
@@ -268,7 +269,7 @@ def draw_file_robot(member, conditions):
             return robot, robot.measured(conditions)
         for _ in range(DRAWS):
             fault = draw_fault(kind, conditions.model, conditions.mechanism, generator)
-            strength = float(np.exp(generator.uniform(*np.log(FILE_STRENGTHS))))
+            strength = draw_log_uniform(FILE_STRENGTHS, generator)
             try:
                 return as_driven(replace(robot, acting=(sized(robot, fault, strength, conditions),)), conditions)
             except (SimulationError, UnreachableError) as error:
@@ -372,7 +373,7 @@ def _draw_cause(robot, name, generator, conditions):
     """
     coordinates = kind_of(name).effect_model(conditions.mechanism).coordinates
     for _ in range(_STRENGTH_DRAWS):
-        strength = float(np.exp(generator.uniform(*np.log(MANY))))
+        strength = draw_log_uniform(MANY, generator)
         one = draw_direction(name, coordinates, False, strength, generator)
         try:
             fault = sized(robot, Fault(name, one.coordinates, one.shape), strength, conditions)

@@ -23,7 +23,7 @@ from rrru.studies.blind_validation.noise import NOISES, NoiseModel
 from rrru.studies.blind_validation.robots import noise_free, robot_of, true_gap_mm
 from rrru.studies.blind_validation.score import limits, with_truth
 from rrru.studies.blind_validation.verdicts import PLANTS
-from tests.studies.blind_validation.conditions import CONDITIONS, bare
+from tests.studies.blind_validation.conditions import CONDITIONS, acting, bare
 
 _MECHANISM = CONDITIONS.mechanism
 _CONFIG = {"campaigns": {"paper": {}}, "robots": {"rrru3": {"L1_mm": 400.0}, "mine": {"mjcf": "mine.xml"}}}
@@ -40,10 +40,6 @@ def _calibrated(measurements):
         deviations = deviations + np.linalg.lstsq(slope, (measured - model).ravel(), rcond=None)[0]
     left = measured - _MECHANISM.forward(theta, deviations, rows.command(measurements))
     return deviations, np.sqrt((left**2).sum(axis=1).mean())
-
-
-def _acting(robot, name, single=False, span=(2.0, 2.001), seed=1):
-    return draw.draw_acting(robot, name, single, span, np.random.default_rng(seed), CONDITIONS)
 
 
 # nothing (on a full campaign), one effect, two, one from outside
@@ -75,14 +71,14 @@ def test_one_leg_means_that_leg_alone():
     robot = bare(3)
     alone = Counter()
     for seed in range(12):
-        acting = _acting(robot, "servo_lag", True, (0.5, 1.0), seed)
-        coordinates = np.array(acting.coordinates)
+        cause = acting(robot, "servo_lag", True, (0.5, 1.0), seed)
+        coordinates = np.array(cause.coordinates)
         assert (coordinates >= 0.0).all()
-        assert not acting.leg or (np.flatnonzero(coordinates) == acting.leg - 1).all()
-        alone[bool(acting.leg)] += 1
+        assert not cause.leg or (np.flatnonzero(coordinates) == cause.leg - 1).all()
+        alone[bool(cause.leg)] += 1
     assert 1 <= alone[True] <= 8
     # a pair, or an effect without legs, sits on none alone
-    assert _acting(robot, "thermal_growth", True, (0.5, 1.0)).leg == 0
+    assert acting(robot, "thermal_growth", True, (0.5, 1.0)).leg == 0
 
 
 def test_truths_come_in_the_stated_shares(monkeypatch):
@@ -140,8 +136,8 @@ def test_deviations_alone_leave_no_gap():
 @pytest.mark.parametrize("name", OUTSIDE)
 def test_a_cause_from_outside_is_physical_and_no_effect_of_the_library_is_confounded_with_it(name):
     robot = bare(0, "full")
-    acting = _acting(robot, name)
-    robot = replace(robot, acting=(acting,))
+    cause = acting(robot, name)
+    robot = replace(robot, acting=(cause,))
     assert robot.truth == f"outside:{name}"
     campaign = robot.campaign(CONDITIONS)
     virtual = replace(campaign.robot, deviations={})
@@ -149,7 +145,7 @@ def test_a_cause_from_outside_is_physical_and_no_effect_of_the_library_is_confou
     moved, _ = virtual.positions(motion, motion.position_mm)
     still, _ = VirtualRobot(mechanism=_MECHANISM).positions(motion, motion.position_mm)
     at = _MECHANISM.map_at(motion.drive, motion.position_mm)
-    first = at.move(acting.effect_model.contribute(motion, acting.values).twists)
+    first = at.move(cause.effect_model.contribute(motion, cause.values).twists)
     np.testing.assert_allclose(moved - still, first, atol=0.02 * np.abs(first).max())
     measurements, _ = campaign.run()
     deviations, _ = _calibrated(measurements)

@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 from rrru.errors import UnreachableError
 from rrru.robots.catalogue import make_mechanism
 from rrru.seeds import stream
+from rrru.studies.blind_validation.causes import draw_log_uniform
 from rrru.studies.blind_validation.models import TARGETS_MM
 from rrru.studies.blind_validation.sentences.causes import MUJOCO, NAMES, Cause, Stops, draw_cause
 from rrru.studies.blind_validation.sentences.kinds import KINDS
@@ -22,7 +23,7 @@ _ZERO = {"rad": 0.002, "mm": 0.3}
 _FRAME_MM, _FRAME_RAD = 0.2, 2e-4
 NOISE_MM, NOISE_RAD = (0.01, 0.05), 2e-5
 # rms displacement of a cause over the noise
-_WEAKEST, _STRONGEST = 2.0, 25.0
+_STRENGTHS = (2.0, 25.0)
 _FEWEST, _FRESH, _AGAIN = 60, 200, 10
 _SETTLED_S = 8.0
 _PAYLOAD_KG = 5.0
@@ -143,7 +144,7 @@ def draw(number, seed, most_stops, mujoco_share):
         names = [*MUJOCO] if plant == "mujoco" else [name for name in NAMES if _fits(name, own.nominal)]
         if generator.random() < _ACTING:
             cause = draw_cause(str(generator.choice(names)), own.nominal, generator)
-            own = _sized(own, cause, float(np.exp(generator.uniform(*np.log([_WEAKEST, _STRONGEST])))))
+            own = _sized(own, cause, draw_log_uniform(_STRENGTHS, generator))
         if np.isfinite(replace(own, plant="numpy").poses()[0]).all() and not (
             own.cause and own.cause.beyond(own.nominal)
         ):
@@ -159,7 +160,7 @@ def _still(number, seed, plant, most_stops, generator):
     zeros = np.array([_ZERO[unit] for unit in nominal.units]) * generator.standard_normal(len(nominal.units))
     registered = bool(generator.random() < 0.5)
     # MuJoCo needs long from stop to stop
-    count = _FEWEST if plant == "mujoco" else int(np.exp(generator.uniform(*np.log([_FEWEST, most_stops]))))
+    count = _FEWEST if plant == "mujoco" else int(draw_log_uniform((_FEWEST, most_stops), generator))
     reading = str(generator.choice(READINGS))
     # with a constant orientation, frame and tool are confounded
     reading = "tool" if reading in ("pose", "found") and not _turns(nominal) else reading
@@ -176,7 +177,7 @@ def _still(number, seed, plant, most_stops, generator):
         reading=reading,
         frame=_frame(generator, registered),
         registered=registered,
-        noise_mm=float(np.exp(generator.uniform(*np.log(NOISE_MM)))),
+        noise_mm=draw_log_uniform(NOISE_MM, generator),
         seed=seed,
     )
 
