@@ -1,6 +1,7 @@
 """Pages of own robots judged sentence by sentence: what is judged against; every judge can say true and false."""
 
 import numpy as np
+import pandas as pd
 import pytest
 from scipy.spatial.transform import Rotation
 
@@ -418,6 +419,31 @@ def test_statements_are_the_same_again_and_nothing_is_of_an_unknown_kind():
     table = sentences(stated).set_index("kind")
     assert table[["true", "false", "undecided"]].to_numpy().sum() == len(stated)
     assert table.loc["verdict", "example_true"].startswith("gantry3_0009") or not table.loc["verdict", "true"]
+
+
+def test_a_judged_page_is_what_the_library_answers(tmp_path):
+    """A gantry of a URDF, its frame registered, its base drifting."""
+    import rrru
+    from rrru.store import json_files
+    from rrru.studies.blind_validation.sentences import page
+    from rrru.studies.blind_validation.sentences.draws import draw
+
+    own = draw(29, 4, 70, 0.0)
+    rows = own.table(own.readings(own.poses()), True)[np.repeat(~own.stops.fresh, len(own.targets))]
+    own.write(tmp_path, rows, "stops.csv")
+    section, robot = own.section(tmp_path, "stops.csv"), own.nominal.section(str(tmp_path / own.robot_file), own.kind)
+    found = page.run(own.name, section, robot, {})
+    stated = {key: value for key, value in section.items() if key not in ("robot", "ingest")}
+    campaign = rrru.read_campaign(section["ingest"], rrru.load_robot(robot, name="own"), name=own.name, **stated)
+    answer = rrru.diagnose(campaign).write_corrected(tmp_path / "mine.urdf")
+    assert json_files.text(found.page.facts) == answer.to_json()
+    assert found.page.corrected.read_text() == (tmp_path / "mine.urdf").read_text()
+    assert found.page.read == campaign.notes
+    assert {name for name in answer.tables if len(answer.tables[name])} >= {"gap_parameters", "corrected_drives"}
+    for name, table in found.page.tables.items():
+        pd.testing.assert_frame_equal(table, answer.tables[name][list(table.columns)], check_exact=True)
+    # the true frame, but for the robot's own errors
+    np.testing.assert_allclose(found.rotation @ own.frame[0], np.eye(3), atol=5e-3)
 
 
 def test_a_mistake_is_judged_by_the_words_that_it_gets(tmp_path):

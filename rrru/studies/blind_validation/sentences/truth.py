@@ -89,22 +89,22 @@ class Truth:
         return float(np.clip(1.0 - uncertain / self.before_mm**2, 0.0, 1.0))
 
 
-def truth_of(draw, run, folder, gap):
-    """The Truth of a Draw whose Run was made in a folder; gap: the GapSettings."""
+def truth_of(draw, run, folder):
+    """The Truth of a Draw whose Run was made in a folder."""
     inference = run.diagnosis.inference
     case, fresh = inference.case, np.repeat(draw.stops.fresh, len(draw.targets))
     poses, still = draw.poses(), draw.poses(cause=False) if draw.cause else None
     exact = _as_read(draw, run, draw.readings(poses), folder)
-    library = gap.library(case.mechanism)
+    library = run.library(case.mechanism)
     # with the effects as fitted: all readings together could allow more orders of a drive error function
-    whole = make_case(exact, case.mechanism, run.masses, run.noise_mm, library, True, case.arm_mm)
+    whole = make_case(exact, case.mechanism, run.masses, draw.noise_mm, library, True, case.arm_mm)
     whole = replace(whole, library=whole.library | case.library)
     count = len(exact)
     before = whole.left(State(inference.calibrated.deviations, {}))[:count]
     after = whole.standing(inference.state).left(inference.state)[:count]
     free = exact if still is None else _as_read(draw, run, draw.readings(still), folder)
-    geometry, without = _calibrated(free[~fresh], run)
-    _, left = _calibrated(exact[~fresh], run) if still is not None else (None, np.zeros((int((~fresh).sum()), 3)))
+    geometry, without = _calibrated(draw, run, free[~fresh])
+    _, left = _calibrated(draw, run, exact[~fresh]) if still is not None else (None, np.zeros((int((~fresh).sum()), 3)))
     seen, name = before[~fresh], draw.cause.effect if draw.cause else None
     held = name in library
     noise_rms, chosen = float(np.sqrt(3.0) * draw.noise_mm), np.repeat(~draw.stops.fresh, len(draw.targets))
@@ -154,13 +154,13 @@ def _as_read(draw, run, readings, folder):
     draw.write(folder, table.assign(time_s=np.arange(len(table), dtype=float)), _ALL)
     section = draw.section(folder, _ALL)
     exact = page.read(section, draw.nominal.section(str(folder / draw.robot_file), draw.kind)).measurements
-    own, given = run.ingested.measurements, run.ingested.registration
-    seen, vectors = readings
-    exact = exact.assign(**rows.vector_columns("measured", given.apply(seen) if given else seen), status="ok")
+    own, (seen, vectors) = run.measurements, readings
+    seen = seen @ run.rotation.T + run.translation_mm
+    exact = exact.assign(**rows.vector_columns("measured", seen), status="ok")
     exact = exact.assign(time_s=table["time_s"])
     if "measured_rx_rad" in exact:
-        rotation = given.rotation if given else np.eye(3)
-        exact = exact.assign(**rows.turn_columns("measured", rotation @ turned(vectors) @ _seat(draw, own, rotation)))
+        turns = run.rotation @ turned(vectors) @ _seat(draw, own, run.rotation)
+        exact = exact.assign(**rows.turn_columns("measured", turns))
     if "target" in own:
         first = own.drop_duplicates("target").set_index("target")
         columns = [f"target_{axis}_mm" for axis in "xyz"]
@@ -183,10 +183,10 @@ def _seat(draw, own, rotation):
     return Rotation.from_matrix(back).mean().as_matrix()
 
 
-def _calibrated(exact, run):
+def _calibrated(draw, run, exact):
     """Deviations (p,) of a plain calibration of exact readings, and its position residuals (n, 3)."""
     case = run.diagnosis.inference.case
-    own = make_case(exact.reset_index(drop=True), case.mechanism, run.masses, run.noise_mm, {}, True, case.arm_mm)
+    own = make_case(exact.reset_index(drop=True), case.mechanism, run.masses, draw.noise_mm, {}, True, case.arm_mm)
     state = calibrate(own)
     return np.asarray(state.deviations), own.left(state)[: len(exact)]
 
@@ -200,8 +200,8 @@ def _of_files(draw, run, exact, fresh):
     files = {"given": written.with_name(draw.robot_file)}
     if not any(text.startswith("not corrected") for text in run.page.not_in_model):
         files["file"] = written
-    measured, read = rows.measured(exact), rows.measured(run.ingested.measurements)
-    right = (run.ingested.measurements["status"] == "ok").to_numpy()
+    measured, read = rows.measured(exact), rows.measured(run.measurements)
+    right = rows.usable(run.measurements)
     for key, file in files.items():
         loops = draw.kind == "mjcf" and draw.nominal.formats == ("mjcf",)
         joint_effects = {one["name"] for one in run.page.facts["effects"]} & {"drive_compliance", "backlash"}
