@@ -32,6 +32,9 @@ _PERIODS_S = (7.3, 19.0, 41.0)
 _SHARES = (0.3, 0.5, 0.7)
 
 
+# --- causes outside the library
+
+
 def _shifted(motion, shift_mm):
     """The measured positions shifted by (n, 3)."""
     return motion.at({WORLD: np.concatenate([shift_mm, np.zeros_like(shift_mm)], axis=1)})
@@ -105,6 +108,9 @@ def drawn_effects(known):
 # every effect, of the library and from outside it, that may act in a 3-RRRU of the check
 EFFECTS = drawn_effects(_LIBRARY)
 CAUSES = _LIBRARY | OUTSIDE
+
+
+# --- causes of 3-RRRUs
 
 
 @dataclass(frozen=True)
@@ -183,6 +189,8 @@ def _draw_value(tried, generator):
         return draw_log_uniform((low, high), generator)
     return float(generator.uniform(low, high))
 
+
+# --- causes of robots of files
 
 _FRICTION = {"rad": ("s^2/rad", 0.0, 1.0), "mm": ("s^2/mm", 0.0, 1e-2)}
 _FRICTION_SOURCE = dict.fromkeys(_FRICTION, "friction over the servo's stiffness, assumed")
