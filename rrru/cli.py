@@ -254,7 +254,7 @@ def _diagnose(options: argparse.Namespace) -> int:
     if options.json:
         print(page.with_name("verdict.json").read_text(encoding="utf-8"), end="")
     else:
-        _print_answer(campaign, page)
+        _print_answer(campaign, page, not options.config)
     return REFUSED if diagnosis.verdict["no_answer"] else DONE
 
 
@@ -267,8 +267,11 @@ def _require_writable(folder: Path) -> None:
         raise ConfigError(f"--out {folder}: cannot be written; allowed: a folder that may be written to")
 
 
-def _print_answer(campaign: Any, page: Path) -> None:
-    """The answer as text: the sentences, what was noted, and where the results are."""
+def _print_answer(campaign: Any, page: Path, as_options: bool) -> None:
+    """The answer as text: the sentences, what was noted, and where the results are.
+
+    as_options: repeat the keys that notes name as options of the command.
+    """
     facts = json.loads(page.with_name("verdict.json").read_text(encoding="utf-8"))
     lead, *others = facts["sentences"]
     print(_wrapped(_bold(lead)))
@@ -280,6 +283,8 @@ def _print_answer(campaign: Any, page: Path) -> None:
         print(_dim(_wrapped(f"note: {note}")))
     if untested:
         print(_dim(_wrapped(f"note: not tested, for reasons that the page has: {', '.join(untested)}")))
+    if as_options and (keys := options_in("; ".join(notes))):
+        print(_dim(_wrapped(f"keys that the notes name, as options of the command: {' '.join(keys)}")))
     print()
     for label, path in (("page", page), ("answer as JSON", page.with_name("verdict.json")), ("tables", page.parent)):
         print(f"{label}: {path}")

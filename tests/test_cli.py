@@ -6,6 +6,7 @@ import shlex
 import subprocess
 import sys
 from dataclasses import replace
+from types import SimpleNamespace
 
 import pandas as pd
 import pytest
@@ -233,3 +234,17 @@ def test_a_proposal_is_a_command_as_well_as_yaml(tmp_path, capsys):
     words = shlex.split(command.partition("rrru diagnose ")[2])
     again, out, _ = ran(capsys, "check", *words)
     assert again == cli.DONE and "used: 'SMR X' as measured_x_mm" in out
+
+
+@pytest.mark.parametrize("as_options", [True, False])
+def test_keys_of_notes_are_options_where_no_configuration_is_given(tmp_path, capsys, as_options):
+    """A note of an accepted file names a key: the command's user reads which option it is."""
+    facts = {
+        "sentences": ["Nothing is left."],
+        "notes": ["would agree with: signs: {q2_rad: -1}"],
+        "corrected_file": None,
+    }
+    (tmp_path / "verdict.json").write_text(json.dumps(facts), encoding="utf-8")
+    cli._print_answer(SimpleNamespace(notes=("no column run",)), tmp_path / "report.html", as_options)
+    said = " ".join(capsys.readouterr().out.split())
+    assert ("keys that the notes name, as options of the command: --set 'signs={q2_rad: -1}'" in said) is as_options

@@ -3,13 +3,15 @@
 Both are estimated from the residuals of the calibration and the known effects. Harmonics are found one after another
 (matching pursuit): each has the drive and order that reduce the sum of squares most. The next one is added where it
 reduces that by more than the cost of choosing it among all resolved ones. The spectrum of a function is the one of
-highest likelihood, its size and the noise chosen with it.
+highest likelihood, its size and the noise chosen with it. Its coefficients are then those of the functions that the
+drive's measured range resolves, its principal components (Karhunen and Loeve).
 """
 
 from dataclasses import replace
 from functools import partial
 
 import numpy as np
+from scipy.linalg import block_diag
 from scipy.optimize import minimize_scalar
 from scipy.special import gammaln
 
@@ -19,6 +21,11 @@ from rrru.diagnosis.state import State
 from rrru.diagnosis.terms import signatures
 from rrru.effects.harmonic import waves
 
+# places of a drive's measured range: a wave of 64 per turn has ten and more
+_PLACES = 721
+# share of the largest function's power below which a function is rounding
+_LEAST_POWER = 1e-10
+
 
 def with_spectra(case, linear, terms):
     """The case whose waves are found and whose spectra are chosen, of effects that no term holds; and keys of these.
@@ -26,7 +33,7 @@ def with_spectra(case, linear, terms):
     linear: about the state of a hypothesis, whose terms are fitted together with them.
     """
     library, held = dict(case.library), {term.effect for term in terms}
-    open_ones = [e for e in library.values() if (e.coordinates.spectra or _is_pending(e)) and e.name not in held]
+    open_ones = [e for e in library.values() if (e.coordinates.roots or _is_pending(e)) and e.name not in held]
     if not open_ones:
         return case, []
     # a rough function of the drives' values contains all harmonics: together with it none would be left
@@ -45,13 +52,10 @@ def with_spectra(case, linear, terms):
                 # nothing stands out: there is nothing to test
                 library.pop(effect.name)
             continue
-        columns = _without(linear.columns[effect.name, 0].reshape(len(data), -1), basis)
-        best, prior_scale = likeliest(data, columns, effect.coordinates.spectra, basis.shape[1])
-        typical = prior_scale * effect.coordinates.spectra[best]
-        # the prior pays for the choice among several by the data
-        log_prior = effect.coordinates.log_prior - np.log(len(effect.coordinates.spectra))
-        chosen = replace(effect.coordinates, typical=typical, spectra=(), sized=True, log_prior=log_prior)
-        library[effect.name] = replace(effect, coordinates=chosen)
+        columns, roots = linear.columns[effect.name, 0].reshape(len(data), -1), effect.coordinates.roots
+        best, prior_scale, noise = likeliest(data, _without(columns, basis), roots, basis.shape[1])
+        library[effect.name] = _chosen(effect, _visible(columns, roots[best], prior_scale / noise), prior_scale)
+        changed.append((effect.name, 0))
     return replace(case, library=library), changed
 
 
@@ -170,22 +174,109 @@ def _waves_of(drive_effect, drive, k, orders):
     return (drive_effect[:, :, k, None] * made[:, None, :]).reshape(3 * len(drive), -1)
 
 
-def likeliest(data, columns, spectra, fitted):
-    """Number of the spectrum of highest likelihood and the factor of its sizes: of data (m,) and columns (m, c).
+def resolved(effect, motion):
+    """An effect of several spectra with coordinates that the drives' measured ranges resolve; else the effect itself.
 
-    spectra: sizes (c,) of the coefficients up to a common factor; fitted: number of parameters fitted together with
-    them.
+    Functions that are smaller than rounding in the whole range are left out: the rest makes the same Gaussian process
+    there.
+    """
+    spectra = effect.coordinates.spectra
+    if not spectra:
+        return effect
+    low, high = np.nanmin(motion.drive, axis=0), np.nanmax(motion.drive, axis=0)
+    places = low + np.linspace(0.0, 1.0, _PLACES)[:, None] * (high - low)
+    by_drive = effect.along_drives(replace(motion, drive=places))
+    ends = np.cumsum([functions.shape[1] for functions in by_drive])[:-1]
+    sizes = [np.split(size, ends) for size in spectra]
+    mixtures, roots = [], []
+    for k, functions in enumerate(by_drive):
+        # the largest size that any spectrum gives a coefficient
+        most = np.max([size[k] / size[k].max() for size in sizes], axis=0)
+        scaled = functions * most
+        power, turned = np.linalg.eigh(scaled.T @ scaled)
+        kept = turned[:, power > _LEAST_POWER * power[-1]][:, ::-1]
+        mixtures.append(most[:, None] * kept)
+        roots.append([_root(kept.T * _rounded(size[k] / most) ** 2 @ kept) for size in sizes])
+    return _mixed(effect, mixtures, {"spectra": (), "roots": tuple(zip(*roots, strict=True))})
+
+
+def _rounded(sizes):
+    """Sizes, zero where they are rounding: arithmetic of the smallest numbers is slow."""
+    return np.where(sizes**2 > _LEAST_POWER**2 * (sizes**2).max(), sizes, 0.0)
+
+
+def _root(covariance):
+    """A matrix (c, r) with root @ root.T equal to a covariance (c, c) but for rounding, columns by their size."""
+    variance, turned = np.linalg.eigh(covariance)
+    kept = variance > _LEAST_POWER * variance[-1]
+    return (turned[:, kept] * np.sqrt(variance[kept]))[:, ::-1]
+
+
+def _mixed(effect, by_drive, changes):
+    """An effect whose coordinates stand for mixtures (c_k, r_k), by drive, of its own; changes: of its Coordinates."""
+    before, functions = effect.coordinates, effect.along_drives
+    mixture, count = block_diag(*by_drive), [its.shape[1] for its in by_drive]
+    after = replace(
+        before,
+        typical=np.ones(len(mixture.T)),
+        legs=np.repeat(np.unique(before.legs), count),
+        positive=np.zeros(len(mixture.T), dtype=bool),
+        to_values=lambda values, shape: before.to_values(mixture @ values, shape),
+    )
+
+    def along_drives(motion):
+        return [whole @ its for whole, its in zip(functions(motion), by_drive, strict=True)]
+
+    return replace(effect, coordinates=replace(after, **changes), along_drives=along_drives)
+
+
+def _visible(columns, by_drive, size):
+    """Mixtures (c_k, r_k) of the columns (m, c) of each drive, independent ones that are not far below the noise.
+
+    size: prior s.d. of a unit, in s.d. of the noise.
+    """
+    ends, result = np.cumsum([len(root) for root in by_drive])[:-1], []
+    for own, root in zip(np.split(columns, ends, axis=1), by_drive, strict=True):
+        made = own @ root
+        power, turned = np.linalg.eigh(made.T @ made)
+        kept = np.maximum(power, 0.0) * size**2 > OPTIONS.min_function_power_per_noise
+        kept[-1] = True
+        result.append(root @ turned[:, kept][:, ::-1])
+    return result
+
+
+def _chosen(effect, by_drive, prior_scale):
+    """An effect of one spectrum, whose coordinates are mixtures (c_k, r_k) by drive of one prior s.d."""
+    coordinates = effect.coordinates
+    unit = max(np.abs(its).max() for its in by_drive)
+    typical = np.full(sum(its.shape[1] for its in by_drive), prior_scale * unit)
+    # the prior pays for the choice among several by the data
+    log_prior = coordinates.log_prior - np.log(len(coordinates.roots))
+    changes = {"typical": typical, "roots": (), "sized": True, "log_prior": log_prior}
+    return _mixed(effect, [its / unit for its in by_drive], changes)
+
+
+def likeliest(data, columns, roots, fitted):
+    """Number of the spectrum of highest likelihood, the factor of its sizes, and the noise, of data (m,).
+
+    columns (m, c); roots: by spectrum and drive as of `Coordinates`. All drives together and each one alone are tried,
+    whatever is likeliest counts. fitted: number of parameters fitted together with them.
     """
     gram, moment, square = columns.T @ columns, columns.T @ data, float(data @ data)
-    found = [
-        _likeliest_factor(size[:, None] * gram * size, size * moment, square, len(data) - fitted) for size in spectra
-    ]
-    best = int(np.argmax([value for value, _ in found]))
-    return best, found[best][1]
+    found = []
+    for number, by_drive in enumerate(roots):
+        root = block_diag(*by_drive)
+        scaled, along = root.T @ gram @ root, root.T @ moment
+        drive = np.repeat(np.arange(len(by_drive)), [its.shape[1] for its in by_drive])
+        for its in (drive >= 0, *(drive == k for k in range(len(by_drive)) if len(by_drive) > 1)):
+            value, factor, noise = _likeliest_factor(scaled[np.ix_(its, its)], along[its], square, len(data) - fitted)
+            # each drive is as probable as another
+            found.append((value - (not its.all()) * np.log(len(by_drive)), number, factor, noise))
+    return max(found)[1:]
 
 
 def _likeliest_factor(gram, moment, square, count):
-    """Highest log likelihood over the factor of all coefficients, and that factor.
+    """Highest log likelihood over the factor of all coefficients, that factor, and the s.d. of the noise with it.
 
     square: sum of squares with so many degrees of freedom; gram (c, c), moment (c,): of columns of unit coefficients.
     For each ratio of factor and noise the likeliest noise is known.
@@ -208,4 +299,5 @@ def _likeliest_factor(gram, moment, square, count):
     best = tried[np.argmin([cost(one) for one in tried])]
     width = tried[1] - tried[0]
     fine = minimize_scalar(cost, bounds=(best - width, best + width), method="bounded")
-    return -float(fine.fun), float(np.exp(fine.x) * np.sqrt(noise(fine.x)))
+    noise_sd = np.sqrt(noise(fine.x))
+    return -float(fine.fun), float(np.exp(fine.x) * noise_sd), float(noise_sd)

@@ -21,6 +21,7 @@ from rrru.campaign.driven_path import (
 from rrru.campaign.stated_motion import stated_motion
 from rrru.diagnosis.approach_direction import at_reversals, rest_widths
 from rrru.diagnosis.discrepancy_basis import unknown_functions
+from rrru.diagnosis.drive_spectra import resolved
 from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.payload_nuisance import nuisance_priors
 from rrru.diagnosis.problem import Case
@@ -84,17 +85,11 @@ def _tested(library, motion, used, count):
         if _fitted(effect, motion):
             untestable[name] = "the calibration's own parameters absorb it"
             continue
-        if effect.coordinates.broad and len(effect.coordinates) > OPTIONS.max_coefficients_per_number * count:
-            coarser = effect.coarser(OPTIONS.max_coefficients_per_number * count) if effect.coarser else None
-            if coarser is None:
-                untestable[name] = f"has {len(effect.coordinates)} coefficients, too many for {count} measured numbers"
-                continue
-            effect = coarser
         lacking = _lacking(effect, motion, used)
         if lacking:
             untestable[name] = lacking
         else:
-            testable[name] = effect
+            testable[name] = resolved(effect, motion)
     return testable, untestable
 
 

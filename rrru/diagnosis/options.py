@@ -24,8 +24,6 @@ class DiagnosisOptions:
     few_numbers_per_parameter: float = 9.0
     # share of a campaign's points that is usually diagnosed; a note says so where fewer are; assumed
     min_used_share: float = 0.8
-    # an effect of more coefficients than this share of the numbers read is not tested; assumed
-    max_coefficients_per_number: float = 0.5
     # bounds of geometric parameters: wider than a calibration's, at which a strong effect would end; assumed
     parameter_bound_rad: float = 0.3
     parameter_bound_mm: float = 100.0
@@ -299,6 +297,9 @@ class DiagnosisOptions:
     min_new_wave_length: float = 1e-6
     # a wave's order differs from that of the grid by at most so many steps: half a step, and a margin
     max_order_shift_steps: float = 0.75
+    # functions of a drive whose power, summed over the readings, is below this share of the noise's variance are left
+    # out: ten thousand of them are worth half a nat
+    min_function_power_per_noise: float = 1e-4
     # logarithms of signal over noise that are tried: from, to, how many; signals of 0.02 to 1,000 times the noise
     min_log_signal_to_noise: float = -4.0
     max_log_signal_to_noise: float = 7.0

@@ -3,14 +3,20 @@
 An encoder's scale, its mounting, teeth, pitch and bearings together make an error that repeats at every value of the
 drive but follows no single wave:
 
-    dq_i = sum over n of s_in sin(n u_i) + c_in cos(n u_i),   n = 1, 2, .. 64
+    dq_i = sum over n of s_in sin(n u_i) + c_in cos(n u_i),   n = 1, 2, .. 128
 
 u_i is the angle of a drive that turns, and pi q_i / L_i of one that slides: L_i is its stroke, of which the waves make
 any function, 1 m where none is stated. It enters at the drive's value. The coefficients of order n are independent and
-normal with a standard deviation in proportion to 1 / sqrt(1 + (n / b)^4). This is a Gaussian process on the circle with
-waves up to about b per turn; higher orders are ever weaker. The likelihood chooses b among some values. The result is
-the spectrum of the error. A gear's sharp orders are `transmission_error` and `transmission_orders`: where few waves
-suffice, these have fewer coefficients and a higher evidence. With few readings only the lower orders are fitted.
+normal. This is a Gaussian process on the circle. Their standard deviation is in proportion to one of
+
+    1 / sqrt(1 + (n / b)^2)    with steps, as where two pieces of a scale are joined
+    1 / sqrt(1 + (n / b)^4)    with corners
+    exp(-(n / b)^2 / 2)        smooth
+
+with waves up to about b per turn. The likelihood chooses the kind and b among some values, for all drives or for one
+alone. The result is the spectrum of the error. A gear's sharp orders are `transmission_error` and
+`transmission_orders`: where few waves suffice, these have fewer coefficients and a higher evidence. Only what the
+measured range of a drive resolves is fitted.
 
 Assumptions: it depends on the drive's value only, not on load or sense of motion; all drives of a kind that err have
 errors of one size.
@@ -19,39 +25,42 @@ Source: MacKay, Introduction to Gaussian processes, 1998 (periodic kernels). The
 1e-4 rad, and a slide of ordinary precision is within 0.02 mm.
 """
 
-from functools import partial
-
 import numpy as np
 
 from rrru.effects.harmonic import waves
 from rrru.effects.protocol import Coordinates, Effect
 from rrru.parameters import Parameter, ParameterSet
 
-ORDERS = np.arange(1, 65)
-_BENDS, _STEEPNESS, _FEWEST = (3.0, 6.0, 12.0, 24.0, 48.0), 4, 4
+ORDERS = np.arange(1, 129)
+# by the kind of a function its falling off with order / bend, and its bends in waves per turn
+_SPECTRA = (
+    # with steps
+    (lambda at: (1.0 + at**2) ** -0.5, (3.0, 12.0, 48.0)),
+    # with corners
+    (lambda at: (1.0 + at**4) ** -0.5, (3.0, 6.0, 12.0, 24.0, 48.0)),
+    # smooth
+    (lambda at: np.exp(-0.5 * at**2), (3.0, 6.0, 12.0, 24.0)),
+)
 _TYPICAL, _MOST = {"rad": 1e-4, "mm": 0.02}, {"rad": 0.01, "mm": 2.0}
 _STROKE_MM = 1000.0
 
 
 def for_robot(robot):
     """The effect model for all drives."""
-    return _of_orders(robot, ORDERS)
-
-
-def _of_orders(robot, orders):
-    """The effect model with waves of orders (k,)."""
     units = robot.parts.units
     parameters = ParameterSet(
         tuple(
             Parameter(f"{part}{drive}_{order}", unit, 0.0, -_MOST[unit], _MOST[unit], "assumed", drive)
             for drive, unit in enumerate(units, 1)
-            for order in orders
+            for order in ORDERS
             for part in ("sine", "cosine")
         )
     )
-    typical = np.repeat([_TYPICAL[unit] for unit in units], 2 * len(orders))
+    typical = np.repeat([_TYPICAL[unit] for unit in units], 2 * len(ORDERS))
     spectra = tuple(
-        typical * np.tile(np.repeat((1.0 + (orders / bend) ** _STEEPNESS) ** -0.5, 2), len(units)) for bend in _BENDS
+        typical * np.tile(np.repeat(falling(ORDERS / bend), 2), len(units))
+        for falling, bends in _SPECTRA
+        for bend in bends
     )
     per_unit = _per_unit(robot)
     none = np.zeros(len(parameters), dtype=int)
@@ -66,24 +75,17 @@ def _of_orders(robot, orders):
 
     def functions(motion):
         """By drive the functions (n, 2 orders) of its value that a unit of each of its coordinates adds."""
-        return [waves(angle, orders) for angle in (motion.drive * per_unit).T]
+        return [waves(angle, ORDERS) for angle in (motion.drive * per_unit).T]
 
     def err(motion, values):
         """Changes of the actuator values under coefficients (K times 2 orders,) in their units."""
         by_drive = np.reshape(values, (len(units), -1))
         return motion.at_drives(np.stack([f @ c for f, c in zip(functions(motion), by_drive, strict=True)], axis=1))
 
-    structure = {"along_drives": functions, "coarser": partial(_coarser, robot), "of_drive_value": True}
-    return Effect("drive_error_function", parameters, coordinates, err, **structure)
+    return Effect("drive_error_function", parameters, coordinates, err, along_drives=functions, of_drive_value=True)
 
 
 def _per_unit(robot):
     """Angle (K,) of the lowest wave per drive value: 1 for drives that turn, in rad per mm for those that slide."""
     strokes = np.where(np.isfinite(robot.strokes), robot.strokes, _STROKE_MM)
     return np.where(np.array(robot.parts.units) == "rad", 1.0, np.pi / strokes)
-
-
-def _coarser(robot, most):
-    """The effect model with at most so many coefficients, None where too few orders are left."""
-    count = int(most) // (2 * len(robot.parts.units))
-    return _of_orders(robot, ORDERS[:count]) if count >= _FEWEST else None

@@ -176,8 +176,9 @@ class Coordinates:
     hyperparameter in addition to the listed shapes; stated: number of shapes, from the first on, that the user has
     stated; doubt: relative s.d. of a hyperparameter, or s.d. of the order of a searched one; broad: whether the
     coordinates are so many that they are marginalised before the other effects are fitted; spectra: prior s.d. (c,)
-    of the coordinates, among which the campaign chooses; sized: whether it has chosen, and `typical` is its choice;
-    log_prior: log prior probability of a choice that was made outside of the fit.
+    of the coordinates, among which the campaign chooses; roots: the same of coordinates that a campaign resolves, by
+    spectrum and drive (c_k, r_k): root @ root.T is the prior covariance; sized: whether it has chosen, and `typical`
+    is its choice; log_prior: log prior probability of a choice that was made outside of the fit.
     """
 
     typical: np.ndarray
@@ -193,6 +194,7 @@ class Coordinates:
     doubt: float = 0.3
     broad: bool = False
     spectra: tuple[np.ndarray, ...] = ()
+    roots: tuple[tuple[np.ndarray, ...], ...] = ()
     sized: bool = False
     log_prior: float = 0.0
 
@@ -259,8 +261,7 @@ class Effect:
     actuator values change, each by a function of itself; with_waves: where harmonic orders are searched, from pairs
     (drive, order) and their log prior to the effect with these orders; waves: these pairs; spoils: where the effect is
     one of the measurement and not of the robot, why a calibration without it is wrong; switches: whether the effect
-    depends on the sign of a load alone; coarser: where few readings do not determine the coefficients, from their
-    largest allowed number to an effect with no more, or None.
+    depends on the sign of a load alone.
     """
 
     name: str
@@ -274,7 +275,6 @@ class Effect:
     with_waves: Callable[..., "Effect"] | None = None
     waves: tuple[tuple[int, float], ...] = ()
     switches: bool = False
-    coarser: Callable[[float], "Effect | None"] | None = None
 
     def doubted(self, name: str, value: float) -> float:
         """A value of a hyperparameter, displaced by one standard deviation."""

@@ -9,7 +9,18 @@ import yaml
 # options of their own; every other key is stated by --set
 _OPTIONS = {"frame": "--frame", "noise_mm": "--noise", "noise_rad": "--noise-rad"}
 _OF_ROBOT = {"tip": "--tip", "base": "--base", "platform": "--platform"}
-_KEYS = ("frame", "unit", "angle_unit", "drive_unit", "signs", "order", "columns", "extra_columns", "time_format")
+_KEYS = (
+    "frame",
+    "unit",
+    "angle_unit",
+    "drive_unit",
+    "signs",
+    "order",
+    "columns",
+    "extra_columns",
+    "time_format",
+    "targets",
+)
 # such a key in a message, with its value as YAML writes it in a line
 _STATED = re.compile(rf"\b({'|'.join(_KEYS)}): (\{{[^{{}}]*\}}|\[[^\[\]]*\]|[\w.]+)")
 

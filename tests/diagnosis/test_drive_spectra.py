@@ -1,10 +1,13 @@
 """Waves and rough functions of the drives' angles in what a calibration leaves of a six-axis arm."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from rrru.diagnosis.calibrate import calibrate
 from rrru.diagnosis.drive_spectra import amplitudes, likeliest, pursue
+from rrru.effects.drive_error_function import ORDERS
 from rrru.effects.library import find
 from tests.diagnosis import arms
 from tests.diagnosis.arms import NOISE_MM
@@ -129,27 +132,51 @@ def test_a_drive_that_stands_still_hides_no_wave_of_another(arm):
 
 
 def test_the_spectrum_that_made_the_data_is_the_likeliest():
-    """Coefficients drawn from each spectrum, unlike sizes, in noise: most draws name it and its size."""
+    """Coefficients drawn from each spectrum, unlike sizes, in noise: most draws name it, all have what it adds."""
     effect = find("drive_error_function", arms.ARM)
-    case = arms.case_of(arms.measure(count=300), "drive_error_function")
+    case = replace(arms.case_of(arms.measure(count=300)), library={effect.name: effect})
     linear = case.linearise(calibrate(case))
     basis, _ = np.linalg.qr(linear.base.reshape(linear.data.size, -1))
-    whole = linear.columns["drive_error_function", 0].reshape(linear.data.size, -1)
+    whole, count = linear.columns[effect.name, 0].reshape(linear.data.size, -1), 2 * len(ORDERS)
     # low orders of two drives do, and are quick
-    keep = np.concatenate([np.arange(2 * 48), 128 + np.arange(2 * 48)])
+    keep = np.concatenate([np.arange(2 * 48), count + np.arange(2 * 48)])
     columns = whole[:, keep] - basis @ (basis.T @ whole[:, keep])
     spectra, hits, draws = [one[keep] for one in effect.coordinates.spectra], 0, 0
+    roots = [[np.diag(own) for own in np.split(size, 2)] for size in spectra]
     for number, size in enumerate(spectra):
         for seed in range(4):
             generator = np.random.default_rng([number, seed])
             prior_scale = generator.uniform(0.7, 2.0)
             data = columns @ (prior_scale * size * generator.standard_normal(len(size)))
             data = data + NOISE_MM * generator.standard_normal(len(data))
-            found, factor = likeliest(data - basis @ (basis.T @ data), columns, spectra, basis.shape[1])
-            assert abs(found - number) <= 1
+            found, factor, noise = likeliest(data - basis @ (basis.T @ data), columns, roots, basis.shape[1])
+            assert noise == pytest.approx(NOISE_MM, rel=0.1)
+            power, true = (factor * spectra[found]) ** 2, (prior_scale * size) ** 2
+            shows = true * (columns**2).sum(axis=0) > 3.0 * NOISE_MM**2
+            assert power[shows].sum() == pytest.approx(true[shows].sum(), rel=0.75)
             assert found != number or factor == pytest.approx(prior_scale, rel=0.3)
             hits, draws = hits + (found == number), draws + 1
-    assert draws == 20 and hits >= 14
+    assert draws == 48 and hits >= 33
+
+
+def test_one_drive_alone_has_the_size_that_it_has():
+    """A rough function of one of six drives: the size is not the mean over six."""
+    effect = find("drive_error_function", arms.ARM)
+    case = arms.case_of(arms.measure(count=200), "drive_error_function")
+    linear = case.linearise(calibrate(case))
+    basis, _ = np.linalg.qr(linear.base.reshape(linear.data.size, -1))
+    found = case.library[effect.name]
+    columns, roots = linear.columns[effect.name, 0].reshape(linear.data.size, -1), found.coordinates.roots
+    generator, factors = np.random.default_rng(8), []
+    for _ in range(8):
+        root = roots[4][2]
+        of_drive = columns[:, found.coordinates.legs == 3] @ (3.0 * root @ generator.standard_normal(root.shape[1]))
+        data = of_drive + NOISE_MM * generator.standard_normal(len(of_drive))
+        _, factor, _ = likeliest(
+            data - basis @ (basis.T @ data), columns - basis @ (basis.T @ columns), roots, basis.shape[1]
+        )
+        factors.append(factor)
+    assert np.median(factors) == pytest.approx(3.0, rel=0.3)
 
 
 def test_an_injected_wave_has_its_amplitude():

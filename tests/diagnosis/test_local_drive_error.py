@@ -70,7 +70,8 @@ def test_a_local_error_of_one_encoder_is_its_error_function(measured):
     # the function of that drive is the hill, up to a constant and a slope, which a length and others absorb
     case, state = found.inference.case, found.state
     effect, values = case.library["drive_error_function"], state.effects["drive_error_function", 0]
-    made = [f @ own for f, own in zip(effect.along_drives(case.motion), np.reshape(values, (6, -1)), strict=True)]
+    functions = enumerate(effect.along_drives(case.motion), 1)
+    made = [own @ values[effect.coordinates.legs == drive] for drive, own in functions]
     lengths = frame[robot.parts.columns[_LEG]].to_numpy()
     line = np.stack([np.ones(_COUNT), lengths], axis=1)
 

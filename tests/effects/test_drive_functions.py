@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from rrru.diagnosis.calibrate import calibrate
+from rrru.diagnosis.drive_spectra import resolved
 from rrru.diagnosis.state import State
 from rrru.effects.drive_error_function import ORDERS
 from rrru.effects.library import find
@@ -26,7 +27,8 @@ HEXAPOD = hexapod(300.0 * _RING, 120.0 * np.roll(_RING, 1, axis=0), 400.0, 80.0)
 FUNCTION, SHARP = "drive_error_function", "transmission_orders"
 WAVES = ((0, 3.0), (4, 7.25), (0, 41.5), (5, 1.5))
 # numbers of coefficients of the function that are looked at: of several drives, sines and cosines, low and high orders
-_SOME = (0, 1, 2 * 6, 130, 128 + 2 * 30 + 1, 3 * 128 + 7, 6 * 128 - 1)
+_ONE = 2 * len(ORDERS)
+_SOME = (0, 1, 2 * 6, _ONE + 2, _ONE + 2 * 30 + 1, 3 * _ONE + 7, 6 * _ONE - 1)
 
 
 def _law(name):
@@ -48,7 +50,7 @@ def motion(frame):
 def _expected(name, number, drive):
     """Drive and function (n,) of one coefficient, by their definition."""
     if name == FUNCTION:
-        joint, rest = divmod(number, 2 * 64)
+        joint, rest = divmod(number, _ONE)
         order, cosine = rest // 2 + 1, rest % 2
     else:
         (joint, order), cosine = WAVES[number // 2], number % 2
@@ -59,7 +61,7 @@ def _expected(name, number, drive):
 def test_a_coefficient_turns_its_own_joint_by_its_wave(name, motion):
     effect = _law(name)
     count = len(effect.coordinates)
-    assert count == (6 * 2 * 64 if name == FUNCTION else 2 * len(WAVES))
+    assert count == (6 * _ONE if name == FUNCTION else 2 * len(WAVES))
     for number in _SOME if name == FUNCTION else range(count):
         values = effect.coordinates.to_values(1e-4 * np.eye(count)[number], {})
         twists = effect.contribute(motion, values).twists
@@ -79,7 +81,7 @@ def test_the_functions_along_the_drives_are_differences_of_what_the_law_contribu
     for number in _SOME:
         step = 1e-3 * np.eye(len(start))[number]
         slope = (effect.contribute(motion, start + step).twists - before) / 1e-3
-        own = site[f"joint {number // 128 + 1}"]
+        own = site[f"joint {number // _ONE + 1}"]
         np.testing.assert_allclose(slope[:, own, 5], together[:, number], rtol=1e-9, atol=1e-11)
 
 
@@ -119,7 +121,7 @@ def test_a_drive_that_others_follow_moves_them_too():
     at = robot.map(drive, poses)
     functions = effect.along_drives(motion)
     for k in range(len(names)):
-        number = k * 128 + 5
+        number = k * _ONE + 5
         made = at.move(effect.contribute(motion, np.eye(len(effect.parameters))[number]).twists)
         np.testing.assert_allclose(functions[k][:, 5, None] * at.drive_effect[:, :, k], made, rtol=0.0, atol=1e-6)
         h = 1e-5 * np.eye(len(names))[k]
@@ -172,32 +174,41 @@ def test_the_waves_of_a_slide_make_any_function_of_its_stroke(robot, stroke, mot
     np.testing.assert_allclose(again, functions, atol=1e-11)
 
 
-@pytest.mark.parametrize("most", [6 * 2 * 64, 6 * 2 * 20 + 7, 48, 47])
-def test_few_readings_have_the_lower_orders(most, motion):
-    """No more coefficients than asked for, the same functions and sizes; None for fewer than four orders."""
-    whole, coarse = _law(FUNCTION), _law(FUNCTION).coarser(most)
-    orders = most // 12
-    assert (coarse is None) == (orders < 4)
-    if coarse is None:
-        return
-    assert len(coarse.coordinates) == 12 * orders and set(coarse.parameters.names) <= set(whole.parameters.names)
-    for own, full in zip(coarse.along_drives(motion), whole.along_drives(motion), strict=True):
-        np.testing.assert_array_equal(own, full[:, : 2 * orders])
-    for own, full in zip(coarse.coordinates.spectra, whole.coordinates.spectra, strict=True):
-        np.testing.assert_array_equal(np.reshape(own, (6, -1)), np.reshape(full, (6, -1))[:, : 2 * orders])
+@pytest.mark.parametrize("span", [0.2, 1.0, 7.0])
+def test_what_a_range_resolves_is_the_same_process_there(span, motion):
+    """Covariances of the functions over the measured range, of each drive and spectrum; a few coefficients do it."""
+    whole, generator = _law(FUNCTION), np.random.default_rng(3)
+    drive = 0.3 + span * generator.random((40, 6))
+    moved = replace(motion, drive=drive)
+    coarse = resolved(whole, moved)
+    between = replace(motion, drive=drive.min(axis=0) + generator.random((40, 6)) * np.ptp(drive, axis=0))
+    functions, full = coarse.along_drives(between), whole.along_drives(between)
+    assert len(coarse.coordinates.roots) == len(whole.coordinates.spectra)
+    for roots, sizes in zip(coarse.coordinates.roots, whole.coordinates.spectra, strict=True):
+        for own, root, every, size in zip(functions, roots, full, np.split(sizes, 6), strict=True):
+            exact = (every * size**2) @ every.T
+            np.testing.assert_allclose(own @ root @ root.T @ own.T, exact, rtol=0.0, atol=3e-5 * exact.max())
+    # as many as half waves of the highest order fit into the range, and some for its ends
+    for own in functions:
+        assert own.shape[1] <= min(_ONE, 2.0 * ORDERS[-1] * span / (2.0 * np.pi) + 60)
+    # and they stand for the parameters
+    values = generator.standard_normal(len(coarse.coordinates))
+    parts = np.split(values, np.cumsum([own.shape[1] for own in functions])[:-1])
+    of_parameters = np.split(coarse.coordinates.to_values(values, {}), 6)
+    for own, part, every, parameters in zip(functions, parts, full, of_parameters, strict=True):
+        np.testing.assert_allclose(own @ part, every @ parameters, rtol=0.0, atol=1e-9 * np.abs(own @ part).max())
 
 
 def test_every_spectrum_falls_with_the_order_alike_for_all_drives():
-    """Sizes of sine and cosine are those of one order: 1 / sqrt(1 + (n / b)^4) up to a factor, of five roughnesses."""
-    coordinates = _law(FUNCTION).coordinates
-    assert len(coordinates.spectra) >= 3
-    roughness = []
-    for spectrum in coordinates.spectra:
+    """Sine and cosine of an order have one size: in the last octave 1 / n for steps, 1 / n^2 for corners, or less."""
+    falling = []
+    for spectrum in _law(FUNCTION).coordinates.spectra:
         sizes = np.reshape(spectrum, (6, len(ORDERS), 2))
-        assert (sizes == sizes[:1, :, :1]).all()
-        power = sizes[0, :, 0] ** -2.0
-        # straight lines over the fourth power of the order
-        line = np.polynomial.polynomial.polyfit(ORDERS.astype(float) ** 4, power / power[0], 1, w=1.0 / power)
-        np.testing.assert_allclose(np.polynomial.polynomial.polyval(ORDERS**4.0, line), power / power[0], rtol=1e-6)
-        roughness.append((line[0] / line[1]) ** 0.25)
-    assert (np.diff(roughness) > 0.0).all() and roughness[0] > 1.0 and roughness[-1] < 64.0
+        assert (sizes == sizes[:1, :, :1]).all() and (np.diff(sizes[0, :, 0]) <= 0.0).all()
+        size = np.maximum(sizes[0, :, 0], 1e-300)
+        # slope in logarithms of the last octave
+        falling.append(np.log2(size[len(ORDERS) // 2 - 1] / size[-1]))
+    falling = np.array(falling)
+    kinds = (falling < 1.01), (falling > 1.01) & (falling < 2.01), (falling > 10.0)
+    assert [int(kind.sum()) for kind in kinds] == [3, 5, 4]
+    assert falling[kinds[0]].max() > 0.9 and falling[kinds[1]].max() > 1.9

@@ -24,7 +24,7 @@ _REMEDIES = {
     "time_s": "a column time_s, in seconds or times of day",
     "drive_rate": "a column time_s on runs along a path that is passed without stops",
     "temperature_c": "a column temperature_c of the robot",
-    "last_move": "`motion: stop_and_go` of a robot that rests at each reading",
+    "last_move": "`motion: stop_and_go` (--set motion=stop_and_go) of a robot that rests at each reading",
 }
 
 

@@ -45,7 +45,7 @@ def state_row(robot, calibrated, state, library, numbers="[]"):
     library: effects by name as the diagnosis fitted them.
     """
     effects = [
-        [name, int(shape), np.asarray(value).tolist(), library[name].waves]
+        [name, int(shape), _saved(library[name].coordinates, value).tolist(), library[name].waves]
         for (name, shape), value in sorted(state.effects.items())
     ]
     return {
@@ -65,15 +65,16 @@ def state_of(row, library):
     """
     saved = {key: json.loads(row[key]) for key in ("calibrated", "deviations", "fitted_effects", "shapes")}
     values = {(name, shape): np.array(value) for name, shape, value, _ in saved["fitted_effects"]}
-    effects = {name: _as_fitted(library[name], len(value), waves) for name, _, value, waves in saved["fitted_effects"]}
+    effects = {
+        name: library[name].with_waves(tuple(map(tuple, waves))) if waves else library[name]
+        for name, _, _, waves in saved["fitted_effects"]
+    }
     return np.array(saved["calibrated"]), State(np.array(saved["deviations"]), values, saved["shapes"]), effects
 
 
-def _as_fitted(effect, count, waves):
-    """The effect with the waves that were found, or with that number of coefficients."""
-    if waves:
-        return effect.with_waves(tuple(map(tuple, waves)))
-    return effect if effect.coarser is None else effect.coarser(count)
+def _saved(coordinates, value):
+    """Values of an effect's coordinates; of coordinates that a campaign has chosen, those that they represent."""
+    return np.asarray(coordinates.to_values(value, coordinates.shapes[0]) if coordinates.sized else value)
 
 
 def fitted(parameters):

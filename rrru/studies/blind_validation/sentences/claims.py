@@ -159,7 +159,7 @@ def _inside(text, stated):
         result.append(Claim("place of a cause", text, stated))
     if "share" in stated and "name" in stated:
         result.append(Claim("share of a cause", text, stated))
-    for match in re.finditer(rf"(?:^|, )(?P<name>[a-z ]+) {_P}(?=,|$)", stated.get("each", "")):
+    for match in re.finditer(rf"(?:^|, )(?P<name>[a-z ]+?) {_P}(?=,|$)", stated.get("each", "")):
         result.append(Claim("probability of a cause", text, match.groupdict()))
     if "listed" in stated and "share" in text.split(":")[0]:
         names = (
