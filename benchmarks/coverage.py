@@ -27,6 +27,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import argparse
 import time
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 import pandas as pd
@@ -106,12 +107,12 @@ def _residual(campaign, frame, inference):
 # --- one draw
 
 
-def one_draw(robot, scene, number, size=1.0):
+def one_draw(robot, scene, number):
     """The results of one draw: rows of its parameters, of its independent directions, and its summary.
 
     The effect of the library acts in every second draw; with payload and tilt unknown, in all.
     """
-    campaign = virtual_campaign(robot, scene, size)
+    campaign = virtual_campaign(robot, scene)
     generators = [stream(_SEED, robot, scene, what, number) for what in ("truth", "noise", "fresh")]
     acts = bool(number % 2) or campaign.scene.payload
     truth = draw_truth(campaign, generators[0], acts)
@@ -226,11 +227,11 @@ def oracle(campaign, frame, truth, used):
 # --- cells
 
 
-def cell(robot, scene, draws, size=1.0, first=0):
+def cell(robot, scene, draws):
     """Tables of parameters, directions and summaries of a number of draws of a cell."""
     parameters, directions, summaries = [], [], []
-    for number in range(first, first + draws):
-        stated, independent, summary = one_draw(robot, scene, number, size)
+    for number in range(draws):
+        stated, independent, summary = one_draw(robot, scene, number)
         parameters += [row | {"draw": number} for row in stated]
         directions += [row | {"draw": number, "direction": k} for k, row in enumerate(independent)]
         summaries.append(summary)
@@ -252,19 +253,19 @@ def coverage(z, draw, held=None):
 
 
 def summarize(parameters, directions, summaries):
-    """One row per cell and kind of parameter; directions: of the geometric parameters, independent."""
+    """One row per kind of parameter of a cell; directions: of the geometric parameters, independent."""
+    good = summaries[summaries["failed"] == ""]
+    head = {"robot": summaries["robot"].iloc[0], "scene": summaries["scene"].iloc[0]}
+    head |= {"draws": len(summaries), "failed": len(summaries) - len(good)}
+    head |= {"right": float(good["right"].astype(float).mean()) if len(good) else np.nan}
     result = []
-    for (robot, scene), own in summaries.groupby(["robot", "scene"], sort=False):
-        good = own[_done(own)]
-        head = {"robot": robot, "scene": scene, "draws": len(own), "failed": len(own) - len(good)}
-        head |= {"right": float(good["right"].astype(float).mean()) if len(good) else np.nan}
-        for kind, some, z in _errors_by_kind(_of_cell(parameters, robot, scene), _of_cell(directions, robot, scene)):
-            rate, error, ratio = coverage(z, some["draw"], some.get("held"))
-            binomial = np.sqrt(0.95 * 0.05 / len(z))
-            row = head | {"kind": kind, "intervals": len(z), "coverage": rate, "coverage_se": max(error, binomial)}
-            row |= {"ratio": ratio, "ratio_68": float(np.nanquantile(np.abs(z), 0.6827))}
-            row |= {"nan": int(np.isnan(z).sum())} | _worst(some, z)
-            result.append(row)
+    for kind, some, z in _errors_by_kind(parameters, directions):
+        rate, error, ratio = coverage(z, some["draw"], some.get("held"))
+        binomial = np.sqrt(0.95 * 0.05 / len(z))
+        row = head | {"kind": kind, "intervals": len(z), "coverage": rate, "coverage_se": max(error, binomial)}
+        row |= {"ratio": ratio, "ratio_68": float(np.nanquantile(np.abs(z), 0.6827))}
+        row |= {"nan": int(np.isnan(z).sum())} | _worst(some, z)
+        result.append(row)
     return pd.DataFrame(result)
 
 
@@ -282,16 +283,6 @@ def _errors_by_kind(parameters, directions):
             yield kind, some, (some["error"] / some["standard_error"]).to_numpy(dtype=float)
 
 
-def _done(summaries):
-    """Flags (n,) of the draws with a diagnosis; an empty text is NaN when read from a file."""
-    return summaries["failed"].isna() | (summaries["failed"] == "")
-
-
-def _of_cell(table, robot, scene):
-    """The rows of a table of one cell."""
-    return table[(table["robot"] == robot) & (table["scene"] == scene)] if len(table) else table
-
-
 def _worst(some, z):
     """The parameter of the largest and of the smallest rms of z (n,)."""
     if "name" not in some:
@@ -302,22 +293,19 @@ def _worst(some, z):
 
 
 def predictions(summaries):
-    """One row per cell: predicted over observed rms, of held-out readings with noise and of the gap without it.
+    """Predicted over observed rms of a cell, one row: of held-out readings with noise and of the gap without it.
 
-    Root mean squares over the draws, and the medians of the draws' own ratios.
+    Root mean squares over the draws, and the medians of the draws' own ratios. No row where every draw has failed.
     """
-    result = []
-    good = summaries[_done(summaries)]
-    for (robot, scene), own in good.groupby(["robot", "scene"], sort=False):
-        row = {"robot": robot, "scene": scene, "draws": len(own)}
-        pairs = (("held_out", "held_out_mm", "fresh_mm"), ("gap", "gap_after_mm", "fresh_gap_mm"))
-        for name, predicted, observed in pairs:
-            row[f"{name}_ratio"] = float(np.sqrt((own[predicted] ** 2).mean() / (own[observed] ** 2).mean()))
-            row[f"{name}_median"] = float((own[predicted] / own[observed]).median())
-        row["noise_mm"], row["noise_runs_mm"] = own["noise_mm"].median(), own["noise_runs_mm"].median()
-        row["seconds"] = own["seconds"].median()
-        result.append(row)
-    return pd.DataFrame(result)
+    good = summaries[summaries["failed"] == ""]
+    if good.empty:
+        return pd.DataFrame()
+    row = {"robot": summaries["robot"].iloc[0], "scene": summaries["scene"].iloc[0], "draws": len(good)}
+    for name, predicted, observed in (("held_out", "held_out_mm", "fresh_mm"), ("gap", "gap_after_mm", "fresh_gap_mm")):
+        row[f"{name}_ratio"] = float(np.sqrt((good[predicted] ** 2).mean() / (good[observed] ** 2).mean()))
+        row[f"{name}_median"] = float((good[predicted] / good[observed]).median())
+    medians = good[["noise_mm", "noise_runs_mm", "seconds"]].median()
+    return pd.DataFrame([row | medians.to_dict()])
 
 
 def main(arguments=None):
@@ -326,35 +314,16 @@ def main(arguments=None):
     parser.add_argument("--draws", type=int, default=200)
     parser.add_argument("--robot", action="append", choices=ROBOTS)
     parser.add_argument("--scene", action="append", choices=SCENES)
-    parser.add_argument("--size", type=float, default=1.0, help="share of the usual number of poses")
-    parser.add_argument("--label", default="now", help="folder of the results, such as before or after")
-    parser.add_argument("--show", action="store_true", help="print the results of the folder's files without a run")
     asked = parser.parse_args(arguments)
-    folder = FOLDER / asked.label
-    folder.mkdir(parents=True, exist_ok=True)
-    cells = [(robot, scene) for scene in asked.scene or SCENES for robot in asked.robot or ROBOTS]
-    if asked.show:
-        print_cells([pd.concat(_stored(folder, name, cells)) for name in _TABLES])
-        return
-    for robot, scene in cells:
-        tables = cell(robot, scene, asked.draws, asked.size)
+    FOLDER.mkdir(parents=True, exist_ok=True)
+    for scene, robot in product(asked.scene or SCENES, asked.robot or ROBOTS):
+        tables = cell(robot, scene, asked.draws)
         for name, table in zip(_TABLES, tables, strict=True):
-            table.to_csv(folder / f"{robot}-{scene}-{name}.csv", index=False)
-        print_cells(tables)
-
-
-def _stored(folder, name, cells):
-    """Stored tables of a name for some cells."""
-    paths = [folder / f"{robot}-{scene}-{name}.csv" for robot, scene in cells]
-    return [pd.read_csv(path) for path in paths if path.exists() and path.stat().st_size > 1]
-
-
-def print_cells(tables):
-    """Print the results of tables of parameters, directions and summaries."""
-    parameters, directions, summaries = tables
-    with pd.option_context("display.width", 250, "display.max_columns", 40, "display.float_format", "{:.3g}".format):
-        for table in (summarize(parameters, directions, summaries), predictions(summaries)):
-            print(table.to_string(index=False), flush=True)
+            table.to_csv(FOLDER / f"{robot}-{scene}-{name}.csv", index=False)
+        options = {"display.width": 250, "display.max_columns": 40, "display.float_format": "{:.3g}".format}
+        with pd.option_context(*(part for option in options.items() for part in option)):
+            for table in (summarize(*tables), predictions(tables[-1])):
+                print(table.to_string(index=False), flush=True)
 
 
 if __name__ == "__main__":

@@ -37,19 +37,18 @@ _FALSE = ("does not repeat",)
 _UNSEEN_SHARE = 0.02
 
 
-def one_campaign(acting, number, effects=None):
+def one_campaign(acting, number):
     """A row with the result of the diagnosis of one campaign; acting: the acting effect, empty for none."""
     generator = stream(_SEED, "noise found", acting, number)
     count, repeated = int(generator.integers(40, 301)), bool(number % 2)
     campaign = pose_campaign("arm7", count, NOISE_MM, acting, (_REPEATED, _TIMES) if repeated else (0, 1), generator)
     truth = draw_truth(campaign, generator, bool(acting))
     frame = measure(campaign, truth, generator)
-    settings = GapSettings(draws=_RESAMPLES) if effects is None else GapSettings(effects=effects, draws=_RESAMPLES)
     known = MeasuredRobot(campaign.mechanism, campaign.masses, NOISE_MM)
     row = {"acting": acting or "none", "number": number, "poses": len(frame), "repeated": repeated}
     began = time.process_time()
     try:
-        found = diagnose(frame, known, settings)
+        found = diagnose(frame, known, GapSettings(draws=_RESAMPLES))
     except (FitError, np.linalg.LinAlgError) as problem:
         return row | {"failed": str(problem)[:200], "seconds": time.process_time() - began}
     facts = answer("arm", found.verdict, found.tables, drive_words(campaign.mechanism))
@@ -84,7 +83,6 @@ def _said(found, facts):
 
 def summarize(table):
     """Counts over all campaigns, and by what acts."""
-    good = table[table["failed"] == ""]
     result = []
     for name, own in [("all", table), *table.groupby("acting", sort=False)]:
         done = own[own["failed"] == ""]
@@ -105,16 +103,15 @@ def summarize(table):
                 "named_right": int((names.replace("", "none") == done["acting"]).sum()),
             }
         )
-    return pd.DataFrame(result), good
+    return pd.DataFrame(result)
 
 
 def main(arguments=None):
     """Run a number of campaigns of each kind, write their table and print the counts."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--campaigns", type=int, default=15)
-    parser.add_argument("--label", default="now", help="folder of the results, such as before or after")
     asked = parser.parse_args(arguments)
-    folder = RESULTS / "benchmarks" / "noise_found" / asked.label
+    folder = RESULTS / "benchmarks" / "noise_found"
     folder.mkdir(parents=True, exist_ok=True)
     result = []
     for number in range(asked.campaigns):
@@ -122,7 +119,7 @@ def main(arguments=None):
             result.append(one_campaign(acting, number))
             pd.DataFrame(result).to_csv(folder / "campaigns.csv", index=False)
             print({k: v for k, v in result[-1].items() if k not in ("number", "seconds")}, flush=True)
-    counts, _ = summarize(pd.DataFrame(result))
+    counts = summarize(pd.DataFrame(result))
     with pd.option_context("display.width", 220, "display.max_columns", 40, "display.float_format", "{:.3g}".format):
         print(counts.to_string(index=False), flush=True)
 

@@ -15,6 +15,7 @@ import contextlib
 import io
 import logging
 import tempfile
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from time import process_time
 
@@ -25,20 +26,6 @@ import yaml
 from mujoco import sysid
 
 from benchmarks import harness
-from benchmarks.recorded import (
-    AXES,
-    FILE,
-    NOISE_MM,
-    NOMINAL,
-    PASSES,
-    PLATFORM,
-    ROOT,
-    UNIT,
-    campaign,
-    draw,
-    trajectories,
-)
-from benchmarks.sysid_table import TABLE, timing_rows
 from rrru.campaign import measurements as rows
 from rrru.diagnosis.correction.corrected_model import write_corrected
 from rrru.diagnosis.diagnose import MeasuredRobot, diagnose
@@ -46,9 +33,23 @@ from rrru.diagnosis.settings import GapSettings
 from rrru.kinematics.dynamics import Masses
 from rrru.pipeline import setup
 from rrru.simulation import mujoco_causes, mujoco_model
+from rrru.simulation.mujoco_robot import MujocoRobot
+from rrru.simulation.mujoco_run import Machine
 from rrru.store import tables
+from rrru.store.schema import read_tables
 from rrru.studies.end_to_end.models import errors
 
+ROOT = Path(__file__).resolve().parents[1]
+FILE, PLATFORM, NOISE_MM = ROOT / "data/models/arm6.xml", "tool0", 0.01
+NOMINAL = {"name": "arm6", "dimensions": {"mjcf": str(FILE), "platform": PLATFORM}, "parameter_set": "zero"}
+AXES = [f"axis{k}" for k in range(1, 7)]
+# units of a drive's parameters: mrad, µrad/(N m), mrad
+UNIT = {"zero": 1e-3, "soft_servo": 1e-9, "play": 1e-3}
+PASSES = ({}, {"reverse": True}, {"trajectories": ["line_1", "spiral"], "payload_kg": 4.0})
+# slow enough that inertia is negligible for the diagnosis, which uses the plan's times
+_MOTION = {"speed_mm_s": 300.0, "acceleration_mm_s2": 10.0, "dwell_s": 60.0}
+# rest before each sequence
+_BEFORE_S = 0.1
 # seeds from 0 on; the first few are also fitted in the other structure
 ROBOTS, WRONG, OUT = 6, 2, ROOT / "results/tables/sysid.parquet"
 _MASSES = Masses(0.0, 0.0, 0.0)
@@ -58,6 +59,158 @@ _OPTIONS = {"eps": 1e-3, "xtol": 1e-4, "gtol": 1e-4, "max_iters": 10, "x_scale":
 _SIGMAS = 1.96
 _START = {"zero": 0.0, "soft_servo": 0.1, "play": 0.2}
 _BOUNDS = {"zero": (-20.0, 20.0), "soft_servo": (0.005, 50.0), "play": (0.0, 5.0)}
+TABLE = read_tables("""
+## sysid | tables/sysid.parquet | robot by given
+`mujoco.sysid` and the diagnosis on the same campaigns of arms simulated by MuJoCo, from benchmarks/sysid.py.
+--
+robot                  int    seed that it was drawn with
+cause                  str    acting cause, in addition to zero offsets {soft_servo, play}
+by                     str    method {mujoco.sysid, rrru}
+given                  str    structure fitted by mujoco.sysid; the diagnosis has none
+    {soft_servo, play, nothing}
+answer                 str    verdict of the diagnosis with its probability; warnings of mujoco.sysid
+numbers                int    numbers of the cause with a finite interval
+held                   int    of these, true numbers inside their 95 % interval
+off_sigmas             float? deviation of the cause's number over its standard error; null without such a number
+zeros                  int    zeros of drives with a finite interval
+zeros_held             int    of these, true ones within it
+left_mm                float  residual rms on the campaign
+fresh_mm               float  residual rms on a new campaign
+noise_mm               float  rms of the noise
+points                 int    of the campaign
+seconds                float  of this process and its threads
+""")[0]
+
+
+# --- robots with every control recorded
+
+
+@dataclass(frozen=True)
+class Truth:
+    """A robot: zeros (6,) in mrad, its cause, its drive, and its size in that cause's unit."""
+
+    zeros: np.ndarray
+    cause: str
+    drive: str
+    size: float
+
+    @property
+    def causes(self):
+        """The causes as the plant's input."""
+        if self.cause == "play":
+            acting = {"play": {self.drive: UNIT["play"] * self.size}}
+        else:
+            acting = {"actuator_stiffness": {self.drive: 1.0 / (UNIT["soft_servo"] * self.size)}}
+        return {"zero_offset": dict(zip(AXES, UNIT["zero"] * self.zeros, strict=True))} | acting
+
+
+def draw(seed):
+    """The Truth of a seed; even ones have a soft drive that carries weight, odd ones backlash in a large joint."""
+    generator = np.random.default_rng(seed)
+    zeros, even = 2.0 * generator.standard_normal(6), seed % 2 == 0
+    drive = str(generator.choice(AXES[1:3] if even else AXES[:3]))
+    low, high = (4.0, 12.0) if even else (0.15, 0.6)
+    size = float(np.exp(generator.uniform(np.log(low), np.log(high))))
+    return Truth(zeros, "soft_servo" if even else "play", drive, size)
+
+
+@dataclass
+class Recorded:
+    """Controls (6,) of every step with one payload from rest on, and the steps of the readings.
+
+    start: values of qpos by joint at rest.
+    """
+
+    payload_kg: float
+    start_s: float
+    start: dict
+    controls: list = field(default_factory=list)
+    read: list = field(default_factory=list)
+
+    def rest(self, time_s, controls):
+        """Fill up the steps until a time with controls that did not change."""
+        steps = round((time_s - self.start_s + _BEFORE_S) / mujoco_model.STEP_S)
+        self.controls += [controls] * (steps - len(self.controls))
+
+
+class Recorder(Machine):
+    """Records the controls of every step, from the first point on, and the times of readings."""
+
+    sequences = ()
+
+    def _recorded(self):
+        """A new Recorded of the robot in its current state."""
+        start = {name: self.data.joint(name).qpos.copy() for name in self.edit.home}
+        return Recorded(self.payload_kg, self.data.time, start)
+
+    def _now(self):
+        """The current controls without the zero offsets, which the controller does not know."""
+        return self.data.ctrl[self.actuators] - [self.edit.offsets.get(joint, 0.0) for joint in self.edit.servos]
+
+    def _weigh(self, payload_kg):
+        super()._weigh(payload_kg)
+        self.payload_kg = payload_kg
+        if self.sequences:
+            self.sequences.append(self._recorded())
+
+    def _closed(self, where):
+        super()._closed(where)
+        self.sequences = self.sequences or [self._recorded()]
+        sequence = self.sequences[-1]
+        sequence.rest(self.data.time, self._now())
+        sequence.read.append(len(sequence.controls) - 2)
+
+    def _send(self, controls):
+        for row in controls:
+            if self.sequences:
+                self.sequences[-1].rest(self.data.time, self._now())
+            super()._send(row[None])
+            if self.sequences:
+                self.sequences[-1].controls.append(self._now())
+
+
+@dataclass(frozen=True)
+class RecordedRobot(MujocoRobot):
+    """A MujocoRobot that stores its Recorder."""
+
+    recorders: list = field(default_factory=list)
+
+    def machine(self, payload_kg=0.0):
+        """The Recorder as the machine of a MujocoRobot."""
+        made = super().machine(payload_kg)
+        self.recorders[:] = [Recorder(made.edit, made.file)]
+        return self.recorders[0]
+
+
+def campaign(truth, seed, trajectories, passes, name):
+    """Measurements of a Truth's robot, and the recorded controls."""
+    virtual = {
+        "name": name,
+        "seed": seed,
+        "robot": {"mujoco": {"causes": truth.causes}},
+        "trajectories": trajectories,
+        "passes": [{"reverse": False, "payload_kg": 0.0} | campaign_pass for campaign_pass in passes],
+        "motion": _MOTION,
+        "noise_mm": NOISE_MM,
+    }
+    driven = setup.virtual_campaign(NOMINAL, virtual)
+    plant = driven.robot
+    robot = RecordedRobot(plant.mechanism, plant.file, plant.platform, plant.causes)
+    frame, _ = replace(driven, robot=robot).run()
+    return frame, robot.recorders[0].sequences
+
+
+def trajectories(x_mm, z_mm):
+    """Two lines and a turn of a spiral about a place: short, because every fit simulates them a hundred times."""
+    lines = {"start_mm": [x_mm - 90.0, 0.0, z_mm - 40.0], "end_mm": [x_mm + 90.0, 0.0, z_mm + 40.0]}
+    spiral = {"centre_mm": [x_mm, 0.0], "radius_mm": [50.0, 90.0], "z_mm": [z_mm - 50.0, z_mm + 50.0]}
+    return {
+        "lines": lines | {"offsets_y_mm": [-60.0, 60.0], "points": 7},
+        "spiral": spiral | {"turns": 1.0, "points": 9},
+    }
+
+
+# --- fits of both
 
 
 def structure(given, drive):
@@ -209,6 +362,19 @@ def rows_of(seed):
     used = np.isfinite([after for _, after in found]).all(axis=(0, 2))
     shared = {"robot": seed, "cause": truth.cause, "points": len(measured[0]), "noise_mm": np.sqrt(3.0) * NOISE_MM}
     return [shared | row | {"fresh_mm": rms(after[used])} for row, after in found]
+
+
+def timing_rows(frame):
+    """Rows of `benchmarks`: seconds of both for the same robots, `mujoco.sysid` with the correct structure."""
+    fitted = frame[(frame["by"] == "rrru") | (frame["given"] == frame["cause"])]
+    rows = []
+    for cause, runs in fitted.groupby("cause"):
+        ours, theirs = (runs[runs["by"] == by].set_index("robot")["seconds"] for by in (harness.OURS, "mujoco.sysid"))
+        task = harness.Task("sysid", f"numbers of a MuJoCo arm, {cause}", int(runs["points"].max()))
+        note = "cause given, fits parameters; rrru finds both"
+        rows.append(task.row(harness.OURS, ours.median(), [1.0]))
+        rows.append(task.row("mujoco.sysid", theirs.median(), (theirs / ours).to_numpy(), note=note))
+    return rows
 
 
 def main():

@@ -7,8 +7,8 @@ import pytest
 
 from rrru.diagnosis.diagnose import MeasuredRobot, diagnose
 from rrru.diagnosis.settings import GapSettings
-from rrru.studies.blind_validation.faults import Fault
-from rrru.studies.blind_validation.foreign import FileRobot
+from rrru.studies.blind_validation.causes import Fault
+from rrru.studies.blind_validation.robots import FileRobot
 from tests.studies.blind_validation.files import conditions
 
 _WITH_BACKLASH = FileRobot(

@@ -3,11 +3,13 @@
 `python -m benchmarks.coverage` has all scenes and as many draws as one likes.
 """
 
+from types import SimpleNamespace
+
 import numpy as np
+import pandas as pd
 import pytest
 
 from benchmarks.coverage import coverage, one_draw, oracle
-from benchmarks.target_folds import predicted_and_exact_mm
 from benchmarks.virtual_campaigns import (
     NOISE_MM,
     Noise,
@@ -19,6 +21,10 @@ from benchmarks.virtual_campaigns import (
     virtual_campaign,
 )
 from rrru.campaign import measurements as rows
+from rrru.diagnosis.evidence import ModelEvidence
+from rrru.diagnosis.heldout import HeldOut
+from rrru.diagnosis.state import LinearizedProblem
+from rrru.estimation.noise_model import NoiseModel
 from rrru.simulation.virtual_robot import VirtualRobot
 
 
@@ -102,9 +108,37 @@ def test_coverage_of_normal_errors_is_095():
     assert coverage(np.where(np.arange(20000) % 2, z, np.nan), draw)[0] == pytest.approx(0.475, abs=0.01)
 
 
+def _held_out_of_targets(generator, poses=120):
+    """A HeldOut of two targets measured in sequence over the same poses, and the columns (n, 3, p): synthetic.
+
+    Four parameters are shared, three are the place of a target that was read in one run alone.
+    """
+    count, generic = 2 * poses, generator.standard_normal((poses, 3, 4))
+    columns = np.zeros((count, 3, 4 + 2 * 3))
+    for target in range(2):
+        own = slice(target * poses, (target + 1) * poses)
+        columns[own, :, :4] = generic + 0.3 * generator.standard_normal(generic.shape)
+        turns = np.linalg.qr(generator.standard_normal((poses, 3, 3)))[0]
+        columns[own, :, 4 + 3 * target : 7 + 3 * target] = turns
+    run = np.repeat([1, 2], poses)
+    data = NOISE_MM * generator.standard_normal((count, 3))
+    linear = LinearizedProblem(data, columns, {}, {}, {}, np.zeros((count, 3, 0)))
+    points = pd.DataFrame({"trajectory": "poses", "run": run})
+    case = SimpleNamespace(points=points, run=run, stop=np.arange(count), series=run, noise_mm=NOISE_MM)
+    return HeldOut(case, ModelEvidence({}, linear, run, NoiseModel.white(NOISE_MM), False)), columns
+
+
 @pytest.mark.parametrize("seed", range(5))
 def test_held_out_errors_of_two_targets_in_one_run_each_are_those_of_a_fit(seed):
-    stated, exact = predicted_and_exact_mm(np.random.default_rng(seed), NOISE_MM)
+    """A fold that is one run leaves its target's place undetermined: its prediction says nothing about the model.
+
+    The error of a fit to all readings is sigma^2 trace((X' X)^-1 X_i' X_i) at reading i.
+    """
+    held_out, columns = _held_out_of_targets(np.random.default_rng(seed))
+    stated = np.sqrt(held_out.predict((), [], 0).uncertainty_mm2.mean())
+    flat = columns.reshape(-1, columns.shape[-1])
+    inverse = np.linalg.inv(flat.T @ flat)
+    exact = np.sqrt(NOISE_MM**2 * np.einsum("ij,jk,ik->", flat, inverse, flat) / len(columns))
     # four fifths of the readings are fitted to
     assert exact < stated < 1.25 * exact
 

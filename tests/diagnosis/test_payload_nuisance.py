@@ -20,9 +20,9 @@ from rrru.errors import ConfigError
 from rrru.kinematics.dynamics import Masses
 from rrru.kinematics.point_masses import PLATFORM
 from rrru.seeds import stream
-from rrru.studies.blind_validation.box import draw_trajectories
-from rrru.studies.blind_validation.faults import Fault
-from rrru.studies.blind_validation.foreign import FileRobot
+from rrru.studies.blind_validation.causes import Fault
+from rrru.studies.blind_validation.draw import draw_trajectories
+from rrru.studies.blind_validation.robots import FileRobot
 from tests.diagnosis.campaigns import ROBOT, active, measure
 from tests.diagnosis.test_marginal_problem import GRIDS, asked, coefficients_of, the_same
 from tests.studies.blind_validation.files import conditions

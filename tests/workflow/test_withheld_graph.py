@@ -81,12 +81,10 @@ def test_no_code_of_the_diagnosis_knows_how_robots_are_drawn(script):
     # of the study that draws the robots only how verdicts and corrected sims are written down, and other ways to them
     own = {
         "__init__",
-        "numbers",
         "schemas",
         "stated",
-        "states",
-        *(("beliefs", "rivals", "verdicts") if "beliefs" in script else ()),
+        *(("rivals", "verdicts") if "beliefs" in script else ()),
     }
     assert {name for package, name in modules if package == "blind_validation"} <= own
     # and the walk would see them
-    assert {("blind_validation", name) for name in ("draw", "robots", "outside")} <= _modules("withheld_score")
+    assert {("blind_validation", name) for name in ("draw", "robots", "causes")} <= _modules("withheld_score")

@@ -2,7 +2,7 @@
 
 from rrru.store import tables
 from rrru.store.job import run
-from rrru.studies.delta import draws, fits, spread, views
+from rrru.studies.delta import draws, fits, views
 from rrru.studies.delta.centres import pose_errors
 from rrru.studies.delta.schemas import TABLES
 from rrru.studies.delta.variants import Seen
@@ -13,7 +13,7 @@ def main(settings, inputs, outputs):
     """Write calibrations, observability, errors on the plane, those of other draws and robots, and the camera."""
     centres, truth = tables.read(inputs["delta_centres"]), tables.read(inputs["delta_truth"])
     robot, section = twin(settings), settings["delta"]
-    others = spread.Spread(**section["spread"])
+    others = fits.Spread(**section["spread"])
     noise = draws.centre_noise_px(settings, truth, tables.read(inputs["delta_dots"]))
     errors = draws.drawn_errors(settings, truth, noise, others.draws, "draws")
     calibrations, observability, points = fits.study(robot, Seen.of_tables(centres, truth), section["length_error_mm"])
@@ -22,8 +22,8 @@ def main(settings, inputs, outputs):
         "delta_calibrations": calibrations,
         "delta_observability": observability,
         "delta_points": points,
-        "delta_draws": spread.other_draws(robot, truth, errors),
-        "delta_robots": spread.other_robots(robot, truth, errors, others),
+        "delta_draws": fits.other_draws(robot, truth, errors),
+        "delta_robots": fits.other_robots(robot, truth, errors, others),
         "delta_poses": pose_errors(centres, truth),
     }
     tables.write_all(TABLES, frames, outputs)

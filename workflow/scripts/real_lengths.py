@@ -7,9 +7,8 @@ from rrru.figures.drawing import draw_all
 from rrru.store import tables
 from rrru.store.job import run, tell
 from rrru.studies.real import belts, cables
-from rrru.studies.real.refusals import named, refused
 from rrru.studies.real.schemas import TABLES
-from rrru.studies.real.series import found, missing
+from rrru.studies.real.series import found, missing, named, refused
 
 _STUDIES = {"belts": belts.study, "cables": cables.study}
 

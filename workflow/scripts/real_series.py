@@ -12,9 +12,8 @@ from rrru.store.atomic_write import whole
 from rrru.store.job import run, tell
 from rrru.studies.real import arm_tables, arms
 from rrru.studies.real.carry import saved_values
-from rrru.studies.real.refusals import refused
 from rrru.studies.real.schemas import SERIES_TABLES
-from rrru.studies.real.series import found
+from rrru.studies.real.series import found, refused
 
 
 def main(settings, inputs, outputs):

@@ -9,8 +9,7 @@ from rrru.pipeline import setup
 from rrru.store import tables
 from rrru.store.job import run
 from rrru.studies.blind_validation.advice import UNSURE, advice_summary, ambiguous, follow
-from rrru.studies.blind_validation.members import robot_of
-from rrru.studies.blind_validation.robots import Conditions
+from rrru.studies.blind_validation.robots import Conditions, robot_of
 from rrru.studies.blind_validation.schemas import TABLES
 
 

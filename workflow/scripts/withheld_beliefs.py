@@ -8,7 +8,7 @@ from rrru.kinematics.dynamics import Masses
 from rrru.pipeline import setup
 from rrru.store import tables
 from rrru.store.job import run
-from rrru.studies.blind_validation.beliefs import beliefs
+from rrru.studies.blind_validation.rivals import beliefs
 from rrru.studies.blind_validation.schemas import TABLES
 
 

@@ -9,10 +9,8 @@ from rrru.kinematics.dynamics import Masses
 from rrru.pipeline import setup
 from rrru.store import tables
 from rrru.store.job import run
-from rrru.studies.blind_validation.numbers import fitted
 from rrru.studies.blind_validation.schemas import TABLES
-from rrru.studies.blind_validation.stated import stated
-from rrru.studies.blind_validation.states import VERDICT, state_row
+from rrru.studies.blind_validation.stated import VERDICT, fitted, state_row, stated
 
 
 def main(settings, inputs, outputs):

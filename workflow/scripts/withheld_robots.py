@@ -5,7 +5,8 @@ import pandas as pd
 from rrru.store import tables
 from rrru.store.job import run
 from rrru.studies.blind_validation.chunks import Member
-from rrru.studies.blind_validation.members import all_conditions, drawn
+from rrru.studies.blind_validation.draw import drawn
+from rrru.studies.blind_validation.robots import all_conditions
 from rrru.studies.blind_validation.schemas import tables_of
 
 

@@ -3,9 +3,9 @@
 from rrru.diagnosis.settings import GapSettings
 from rrru.store import tables
 from rrru.store.job import run
-from rrru.studies.blind_validation.members import Known, all_conditions
+from rrru.studies.blind_validation.robots import all_conditions
 from rrru.studies.blind_validation.schemas import TABLES
-from rrru.studies.blind_validation.score import score_chunk
+from rrru.studies.blind_validation.score import Known, score_chunk
 
 
 def main(settings, inputs, outputs):

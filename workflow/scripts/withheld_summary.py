@@ -2,9 +2,17 @@
 
 from rrru.store import tables
 from rrru.store.job import run
-from rrru.studies.blind_validation.field import field_verdicts, read_field_answers, score_field
 from rrru.studies.blind_validation.schemas import TABLES
-from rrru.studies.blind_validation.summary import CAUSES, LIMITS, PARTS, confusion, summary
+from rrru.studies.blind_validation.summary import (
+    CAUSES,
+    LIMITS,
+    PARTS,
+    confusion,
+    field_verdicts,
+    read_field_answers,
+    score_field,
+    summary,
+)
 
 
 def main(settings, inputs, outputs):

@@ -114,7 +114,7 @@ def rivalled(section):
 
 def check(config):
     """Raise ConfigError where the `withheld` section names a campaign or an effect that does not exist."""
-    from rrru.studies.blind_validation.outside import EFFECTS
+    from rrru.studies.blind_validation.causes import EFFECTS
 
     section = config["withheld"]
     for key, known in (("field", config["campaigns"]), ("effects", EFFECTS)):

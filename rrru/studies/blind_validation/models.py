@@ -25,7 +25,8 @@ class Model:
     targets: dict = field(default_factory=dict)
 
 
-_TARGETS = {"a": (60.0, 0.0, 40.0), "b": (-50.0, 60.0, 40.0), "c": (-40.0, -70.0, 60.0)}
+# places of reflectors on a platform
+TARGETS_MM = {"a": (60.0, 0.0, 40.0), "b": (-50.0, 60.0, 40.0), "c": (-40.0, -70.0, 60.0)}
 _PLATES = ("plate", "part2", "part3")
 
 
@@ -73,7 +74,7 @@ def _hexapod():
         links=tuple((f"piston{k}.z",) for k in legs),
         lengths=tuple(((f"cylinder{k}.x", f"leg_{k}_ball_x"),) for k in legs),
         growth_mm=growth,
-        targets=_TARGETS,
+        targets=TARGETS_MM,
     )
 
 
@@ -88,7 +89,7 @@ def _arm6():
         lengths=((("elbow.z", "axis3_z"),), (("forearm.x", "axis4_x"),)),
         tilts=((("upper_arm.rx", "axis2_rx"),), (("elbow.rz", "axis3_rz"),), (("forearm.rz", "axis4_rz"),)),
         growth_mm=growth,
-        targets=_TARGETS,
+        targets=TARGETS_MM,
     )
 
 

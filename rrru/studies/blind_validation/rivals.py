@@ -1,4 +1,4 @@
-"""Other methods to find the cause of a gap, with the campaign, linearisation and stated noise of the diagnosis.
+"""Other methods to find the cause of a gap, compared with the diagnosis on the same measurements and stated noise.
 
 Bayes' information criterion of linear signatures (G. Schwarz, Annals of Statistics 6, 1978), the lasso with that
 criterion (H. Zou, T. Hastie, R. Tibshirani, Annals of Statistics 35, 2007) over resampled points, a spike and slab on
@@ -6,23 +6,27 @@ linear signatures by Gibbs sampling (E. George, R. McCulloch, JASA 88, 1993), an
 left (M. C. Kennedy, A. O'Hagan, J. R. Stat. Soc. B 63, 2001), which names nothing.
 """
 
+import json
 import warnings
 from collections import Counter
 from dataclasses import dataclass
 from itertools import combinations, pairwise
+from time import perf_counter
 
 import numpy as np
+import pandas as pd
 from scipy.linalg import solve_triangular
 
 from rrru.calibration.calibrate import calibrate
 from rrru.calibration.campaign_fit import select
 from rrru.campaign import measurements as rows
-from rrru.diagnosis.diagnose import with_wide_bounds
+from rrru.diagnosis.diagnose import diagnose, with_wide_bounds
 from rrru.diagnosis.make_problem import make_case
 from rrru.diagnosis.problem import Case
 from rrru.diagnosis.state import State
 from rrru.diagnosis.terms import EACH, signatures, variants
-from rrru.studies.blind_validation.verdicts import NONE, in_order
+from rrru.seeds import stream
+from rrru.studies.blind_validation.verdicts import NONE, UNEXPLAINED, in_order
 
 _RESAMPLED, _FOLDS = 50, 5
 # Gibbs sweeps over all effects, the first of which are dropped; probability that an effect acts; standard deviations of
@@ -214,3 +218,57 @@ def gaussian_process(campaign):
 def _label(effects):
     """Names of effects, each once, in the order of a verdict."""
     return in_order("+".join(set(effects))) or NONE
+
+
+def beliefs(measurements, known, settings):
+    """Frame `withheld_beliefs` of a measurement table of a MeasuredRobot, by GapSettings."""
+    found = []
+    for method, answer in _METHODS.items():
+        start = perf_counter()
+        effects, probabilities, share = answer(measurements, known, settings)
+        said = {"effects": effects, "probabilities": json.dumps(probabilities) if probabilities else ""}
+        found.append({"method": method, **said, "share_closed": share, "seconds": perf_counter() - start})
+    return pd.DataFrame(found).assign(robot=known.campaign)
+
+
+def _by_diagnosis(measurements, known, settings):
+    """Verdict, probability by set of effects with all unexplained sets as one, and explained fraction."""
+    result = diagnose(measurements, known, settings, details=False)
+    probabilities = {}
+    for (effects, unexplained), probability in result.inference.posterior.sets().items():
+        name = UNEXPLAINED if unexplained else in_order("+".join(effects)) or NONE
+        probabilities[name] = probabilities.get(name, 0.0) + probability
+    return result.verdict["effects"], probabilities, result.verdict["share_closed"]
+
+
+def _by_probabilities(method, *labels):
+    """The same of a method that gives the probability of each set; labels: of its random stream, if it has one.
+
+    The most probable set, ties broken by name, with all probabilities and no explained fraction.
+    """
+
+    def answer(measurements, known, settings):
+        generators = [stream(settings.seed, label, known.campaign) for label in labels]
+        probabilities = method(_campaign(measurements, known, settings), *generators)
+        return max(sorted(probabilities), key=probabilities.get), probabilities, np.nan
+
+    return answer
+
+
+def _by_gaussian_process(measurements, known, settings):
+    """The explained fraction by a Gaussian process, without effects and probabilities."""
+    return "", {}, gaussian_process(_campaign(measurements, known, settings))
+
+
+def _campaign(measurements, known, settings):
+    """The Campaign of a measurement table of a MeasuredRobot, by GapSettings."""
+    return Campaign.of(measurements, known, settings.library(known.mechanism))
+
+
+_METHODS = {
+    "diagnosis": _by_diagnosis,
+    "bic": _by_probabilities(bayes_information),
+    "lasso": _by_probabilities(lasso, "lasso"),
+    "spike_and_slab": _by_probabilities(spike_and_slab, "spike_and_slab"),
+    "gaussian_process": _by_gaussian_process,
+}

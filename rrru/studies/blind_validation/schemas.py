@@ -15,7 +15,7 @@ kind                   str    paper (each trajectory once), full (reverse runs, 
     full, file}
 truth                  str    true effects joined by +; none; or outside:<name> for a cause outside the library
 file                   str    entry in robots of a robot that is read from a file; empty for the 3-RRRU of our own
-cause                  str    acting causes, as the plant names them, see rrru/studies/blind_validation/faults.py; for
+cause                  str    acting causes, as the plant names them, see rrru/studies/blind_validation/causes.py; for
     the 3-RRRU of our own the truth
 truth_leg              int    the one leg at fault, from 1 on; 0 for all or none
 strength               float  true gap rms over noise rms, without noise

@@ -1,11 +1,28 @@
-"""Summary statistics of the scores of the check on withheld effects, compared with the required values."""
+"""Summary statistics of the scores of the check on withheld effects, compared with the required values.
+
+And the two comparisons that are scored likewise: other methods on the same robots, and campaigns of another simulator
+with answers from the user.
+"""
+
+import json
 
 import numpy as np
 import pandas as pd
 
-from rrru.studies.blind_validation import causes as on_causes
+from rrru.effects.library import NAMES
+from rrru.errors import ConfigError
+from rrru.studies.blind_validation import parts as on_causes
 from rrru.studies.blind_validation.chunks import noise_of
-from rrru.studies.blind_validation.verdicts import AS_ROBOTS_ARE, PLANTS, in_order, is_outside
+from rrru.studies.blind_validation.stated import VERDICT
+from rrru.studies.blind_validation.verdicts import (
+    AS_ROBOTS_ARE,
+    PLANTS,
+    UNEXPLAINED,
+    in_order,
+    is_outside,
+    is_right,
+    scores,
+)
 
 # least strength over the noise of a cause whose statement is counted
 LEAST_STRENGTH = 0.5
@@ -335,3 +352,77 @@ def confusion(scores):
     """Frame `withheld_confusion`: robots by truth and verdict."""
     ordered = scores.assign(verdict=scores["verdict"].map(in_order))
     return ordered.groupby(["check", "truth", "verdict"]).size().rename("robots").reset_index()
+
+
+_NOTES = {
+    "diagnosis": "",
+    "bic": "linear signatures, up to two effects; cannot say unexplained",
+    "lasso": "linear signatures, BIC, 50 resamplings of the points; cannot say unexplained",
+    "spike_and_slab": "linear signatures, Gibbs sampler; cannot say unexplained",
+    "gaussian_process": "of place, direction, time, speed, payload; names nothing",
+}
+
+
+def compare_methods(said, answers):
+    """Frame `withheld_methods` from `withheld_beliefs` and `withheld_answers`."""
+    joined = said.merge(answers, on="robot", validate="many_to_one")
+    joined = joined.assign(**pd.DataFrame([_scored(row) for row in joined.to_dict("records")], index=joined.index))
+    rows = []
+    for method, answered in joined.groupby("method", sort=False):
+        right = answered["right"].dropna()
+        low, high = wilson(right.sum(), len(right))
+        means = answered[["probability_true", "brier", "log_score", "seconds"]].mean()
+        shares = {"right": right.mean(), "right_low": low, "right_high": high}
+        closed = answered.loc[answered["strength"] >= _SEEN, "share_closed"].mean()
+        rows.append({"method": method, "robots": len(answered), **shares, **means, "share_closed": closed})
+    return pd.DataFrame(rows).assign(note=[_NOTES[row["method"]] for row in rows])
+
+
+def _scored(row):
+    """Scores of one method's answer on one robot; NaN where it names nothing."""
+    if not row["effects"]:
+        return dict.fromkeys(("right", "probability_true", "brier", "log_score"), np.nan)
+    probabilities = json.loads(row["probabilities"])
+    truth = UNEXPLAINED if is_outside(row["truth"]) else row["truth"]
+    true = probabilities.get(truth, 0.0)
+    return {
+        "right": float(is_right(row["truth"], row["effects"], "label")),
+        "probability_true": true,
+        # G. W. Brier, Monthly Weather Review 78, 1950
+        "brier": sum(p**2 for p in probabilities.values()) - 2.0 * true + 1.0,
+        "log_score": np.log(max(true, _LEAST_PROBABILITY)),
+    }
+
+
+def field_verdicts(verdicts):
+    """Rows of `withheld_verdicts` from those of `gap_verdicts`."""
+    return verdicts[VERDICT].assign(check="field", robot=verdicts["campaign"], kind="file")
+
+
+def score_field(verdicts, answers):
+    """Frame `withheld_scores` from `field_verdicts` and the user's answers (campaign, effects, leg)."""
+    truth = answers.assign(effects=answers["effects"].map(in_order))
+    truth = truth.rename(columns={"campaign": "robot", "effects": "truth", "leg": "truth_leg"})
+    strength = verdicts["gap_rms_mm"] / verdicts["noise_rms_mm"]
+    joined = verdicts.assign(strength=strength, oracle_detects=False, share_closed_true=np.nan).merge(truth, on="robot")
+    joined = joined.assign(file="", cause=joined["truth"], numbers=0, held=0)
+    right = [is_right(*pair, "field") for pair in zip(joined["truth"], joined["effects"], strict=True)]
+    return scores(joined.assign(right=right))
+
+
+def read_field_answers(path):
+    """The user's answers: a CSV file with the columns campaign, effects (joined by +), leg (0 for none or all)."""
+    answers = pd.read_csv(path, dtype={"campaign": str, "effects": str}, keep_default_na=False)
+    missing = {"campaign", "effects", "leg"} - set(answers.columns)
+    if missing:
+        raise ConfigError(f"withheld.field_answers: {path} lacks the columns {', '.join(sorted(missing))}")
+    for row, effects in zip(answers["campaign"], answers["effects"], strict=True):
+        for name in effects.split("+"):
+            if name not in (*NAMES, "none") and not is_outside(name):
+                known = f"none, outside, {', '.join(NAMES)}"
+                raise ConfigError(f"withheld.field_answers: campaign {row} has the effect {name!r}; known: {known}")
+    for row, leg in zip(answers["campaign"], answers["leg"].astype(str), strict=True):
+        if leg.strip() not in ("", "0", "1", "2", "3"):
+            allowed = "0 to 3, 0 or blank where no leg or all legs have it"
+            raise ConfigError(f"withheld.field_answers: campaign {row} has the leg {leg!r}; allowed: {allowed}")
+    return answers.assign(leg=[int(leg.strip() or 0) for leg in answers["leg"].astype(str)])

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from rrru.calibration.identifiability import analyse
 from rrru.robots.delta import Delta
 from rrru.studies import paper
-from rrru.studies.delta.paper import RESULTS
+from rrru.studies.delta.published import RESULTS
 from rrru.studies.paper import Finding, finding
 
 _PRINTED = {number.item: number.value for number in RESULTS}

@@ -14,7 +14,7 @@ from scipy.optimize import differential_evolution
 
 from rrru.campaign.measurements import vectors
 from rrru.estimation.observations.distances import Distances
-from rrru.studies.delta.paper import RESULTS
+from rrru.studies.delta.published import RESULTS
 from rrru.studies.delta.zero_offset import one_step
 
 # paper C, 3.2 and 3.3: errors on the plane z = 0 in mm

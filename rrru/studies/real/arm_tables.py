@@ -12,7 +12,7 @@ from rrru.diagnosis.drive_spectra import amplitudes
 from rrru.diagnosis.evidence import PRIOR_SCALES, averaged
 from rrru.diagnosis.terms import EffectTerm
 from rrru.studies.real.arms import Studied
-from rrru.studies.real.refusals import named
+from rrru.studies.real.series import named
 from rrru.studies.real.sheets import PLACE
 from rrru.studies.real.steps import counted, held_by_robot, held_out, rms, verdict_step
 

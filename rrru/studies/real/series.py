@@ -8,11 +8,12 @@ from typing import Any
 
 import pandas as pd
 
-from rrru.errors import ConfigError
+from rrru.errors import ConfigError, RrruError
 from rrru.pipeline.config import own_robot_file
 
 # names the folder of data that may not be redistributed
 VARIABLE = "RRRU_REAL_DATA"
+REFUSED = "refused"
 
 
 @dataclass(frozen=True)
@@ -192,3 +193,16 @@ def of_each(place, series):
     return lambda wildcards: [
         place.replace("{set}", wildcards.set).replace("{series}", name) for name in series[wildcards.set]
     ]
+
+
+def refused(series: Series, error: RrruError) -> dict[str, pd.DataFrame]:
+    """Frames by name, without the campaign: the row of `real_verdicts` with the reason in its notes, no numbers."""
+    row = dict.fromkeys(("where", "confounded_with", "next_runs"), "") | {"points": 0, "dropped_points": 0}
+    reason = {"effects": REFUSED, "notes": f"left out: {error}", **named(series)}
+    return {"real_verdicts": pd.DataFrame([row | reason])}
+
+
+def named(series: Series) -> dict[str, str]:
+    """Columns of `real_verdicts` on the series itself."""
+    robot = series.section.get("robot", series.dataset)
+    return {"dataset": series.dataset, "robot": robot, "source": series.file.name}

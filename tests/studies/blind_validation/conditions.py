@@ -16,4 +16,9 @@ CONDITIONS = Conditions(_MECHANISM, _MOTION, Masses(), 0.02, 2021)
 
 def bare(number, kind="paper", name="bare"):
     """A robot that deviates from the nominal one, and nothing more."""
-    return replace(draw.bare(name, np.random.default_rng(number), CONDITIONS.mechanism), kind=kind)
+    return replace(draw.bare(name, np.random.default_rng(number), CONDITIONS), kind=kind)
+
+
+def acting(robot, name, single=False, span=(2.0, 2.001), seed=1):
+    """A cause of a robot of a strength in a span; single: on one leg in a third of the draws."""
+    return draw.draw_acting(robot, name, single, span, np.random.default_rng(seed), CONDITIONS)

@@ -8,7 +8,7 @@ import yaml
 from rrru.campaign.plan import make_plan
 from rrru.campaign.trajectories import from_config
 from rrru.studies.blind_validation.chunks import Member, described
-from rrru.studies.blind_validation.foreign import FileConditions, FileRobot
+from rrru.studies.blind_validation.robots import FileConditions, FileRobot
 from tests.places import ROOT
 
 FILES = ("rrru3_file", "delta_file", "hexapod_file", "arm6_file")

@@ -13,18 +13,17 @@ from rrru.diagnosis.diagnose import Diagnosis, MeasuredRobot
 from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.settings import GapSettings
 from rrru.robots.catalogue import make_mechanism
-from rrru.studies.blind_validation import advice, draw
+from rrru.studies.blind_validation import advice
 from rrru.studies.blind_validation.robots import noise_free
 from tests.schemas import check
-from tests.studies.blind_validation.conditions import CONDITIONS, bare
+from tests.studies.blind_validation.conditions import CONDITIONS, acting, bare
 
 
 @pytest.fixture(scope="module")
 def robot():
     """A robot with compliant drives and a campaign without payload."""
     plain = bare(5)
-    acting = draw.draw_acting(plain, "drive_compliance", False, (2.0, 2.001), np.random.default_rng(1), CONDITIONS)
-    return replace(plain, acting=(acting,))
+    return replace(plain, acting=(acting(plain, "drive_compliance"),))
 
 
 def _arm(measurements, probability=0.5, runs=(), poses=None):

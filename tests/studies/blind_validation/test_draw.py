@@ -17,14 +17,13 @@ from rrru.robots.catalogue import make_mechanism
 from rrru.seeds import stream
 from rrru.simulation.virtual_robot import VirtualRobot
 from rrru.studies.blind_validation import draw
+from rrru.studies.blind_validation.causes import EFFECTS, OUTSIDE
 from rrru.studies.blind_validation.chunks import Member, check, chunks, noise_of
-from rrru.studies.blind_validation.members import robot_of
 from rrru.studies.blind_validation.noise import NOISES, NoiseModel
-from rrru.studies.blind_validation.oracle import limits, with_truth
-from rrru.studies.blind_validation.outside import EFFECTS, OUTSIDE
-from rrru.studies.blind_validation.robots import noise_free, true_gap_mm
+from rrru.studies.blind_validation.robots import noise_free, robot_of, true_gap_mm
+from rrru.studies.blind_validation.score import limits, with_truth
 from rrru.studies.blind_validation.verdicts import PLANTS
-from tests.studies.blind_validation.conditions import CONDITIONS, bare
+from tests.studies.blind_validation.conditions import CONDITIONS, acting, bare
 
 _MECHANISM = CONDITIONS.mechanism
 _CONFIG = {"campaigns": {"paper": {}}, "robots": {"rrru3": {"L1_mm": 400.0}, "mine": {"mjcf": "mine.xml"}}}
@@ -41,10 +40,6 @@ def _calibrated(measurements):
         deviations = deviations + np.linalg.lstsq(slope, (measured - model).ravel(), rcond=None)[0]
     left = measured - _MECHANISM.forward(theta, deviations, rows.command(measurements))
     return deviations, np.sqrt((left**2).sum(axis=1).mean())
-
-
-def _acting(robot, name, single=False, span=(2.0, 2.001), seed=1):
-    return draw.draw_acting(robot, name, single, span, np.random.default_rng(seed), CONDITIONS)
 
 
 # nothing (on a full campaign), one effect, two, one from outside
@@ -76,19 +71,19 @@ def test_one_leg_means_that_leg_alone():
     robot = bare(3)
     alone = Counter()
     for seed in range(12):
-        acting = _acting(robot, "servo_lag", True, (0.5, 1.0), seed)
-        coordinates = np.array(acting.coordinates)
+        cause = acting(robot, "servo_lag", True, (0.5, 1.0), seed)
+        coordinates = np.array(cause.coordinates)
         assert (coordinates >= 0.0).all()
-        assert not acting.leg or (np.flatnonzero(coordinates) == acting.leg - 1).all()
-        alone[bool(acting.leg)] += 1
+        assert not cause.leg or (np.flatnonzero(coordinates) == cause.leg - 1).all()
+        alone[bool(cause.leg)] += 1
     assert 1 <= alone[True] <= 8
     # a pair, or an effect without legs, sits on none alone
-    assert _acting(robot, "thermal_growth", True, (0.5, 1.0)).leg == 0
+    assert acting(robot, "thermal_growth", True, (0.5, 1.0)).leg == 0
 
 
 def test_truths_come_in_the_stated_shares(monkeypatch):
     drawn = Counter()
-    monkeypatch.setattr(draw, "_trajectories", lambda *_: {})
+    monkeypatch.setattr(draw, "draw_trajectories", lambda *_: {})
     monkeypatch.setattr(draw, "true_gap_mm", lambda *_: 1.0)
     monkeypatch.setattr(draw, "draw_acting", lambda robot, name, *_: name)
     effects, kinds = Counter(), Counter()
@@ -141,8 +136,8 @@ def test_deviations_alone_leave_no_gap():
 @pytest.mark.parametrize("name", OUTSIDE)
 def test_a_cause_from_outside_is_physical_and_no_effect_of_the_library_is_confounded_with_it(name):
     robot = bare(0, "full")
-    acting = _acting(robot, name)
-    robot = replace(robot, acting=(acting,))
+    cause = acting(robot, name)
+    robot = replace(robot, acting=(cause,))
     assert robot.truth == f"outside:{name}"
     campaign = robot.campaign(CONDITIONS)
     virtual = replace(campaign.robot, deviations={})
@@ -150,7 +145,7 @@ def test_a_cause_from_outside_is_physical_and_no_effect_of_the_library_is_confou
     moved, _ = virtual.positions(motion, motion.position_mm)
     still, _ = VirtualRobot(mechanism=_MECHANISM).positions(motion, motion.position_mm)
     at = _MECHANISM.map_at(motion.drive, motion.position_mm)
-    first = at.move(acting.effect_model.contribute(motion, acting.values).twists)
+    first = at.move(cause.effect_model.contribute(motion, cause.values).twists)
     np.testing.assert_allclose(moved - still, first, atol=0.02 * np.abs(first).max())
     measurements, _ = campaign.run()
     deviations, _ = _calibrated(measurements)
@@ -186,7 +181,7 @@ def test_the_laws_from_outside_do_as_they_say():
 
 def test_robots_as_they_are_have_one_to_six_causes_and_noise_that_is_not_as_stated(monkeypatch):
     """Names and noises alone: what acts is not simulated."""
-    monkeypatch.setattr(draw, "_trajectories", lambda *_: {})
+    monkeypatch.setattr(draw, "draw_trajectories", lambda *_: {})
     monkeypatch.setattr(draw, "true_gap_mm", lambda *_: 1.0)
     spans = set()
 
@@ -232,7 +227,7 @@ def test_causes_of_a_robot_as_they_are_are_as_strong_as_they_say():
 def _count(number):
     """How many effects of the library act in a 3-RRRU as it is, from what is drawn before them."""
     generator = stream(CONDITIONS.seed, "withheld", "as_robots_are", number)
-    robot = draw.bare("", generator, _MECHANISM)
+    robot = draw.bare("", generator, replace(CONDITIONS, mechanism=_MECHANISM))
     draw.with_background(robot, generator, CONDITIONS)
     draw.noise_not_as_stated(generator)
     return draw.count_of_causes(generator)
@@ -309,4 +304,4 @@ def test_files_that_the_check_has_no_places_in_are_refused(file, message):
 def test_dimensions_without_room_for_the_trajectories_are_refused(dimensions, reason):
     small = make_mechanism("rrru3", dimensions)
     with pytest.raises(ConfigError, match=rf"robots\.rrru3: of 200 drawn trajectories .* 200 are {reason}; allowed: "):
-        draw.bare("small", np.random.default_rng(0), small)
+        draw.bare("small", np.random.default_rng(0), replace(CONDITIONS, mechanism=small))

@@ -10,14 +10,12 @@ import pytest
 from rrru.campaign import measurements as rows
 from rrru.effects.library import find
 from rrru.errors import UnreachableError
-from rrru.studies.blind_validation import foreign, several
+from rrru.studies.blind_validation import draw, robots
+from rrru.studies.blind_validation.causes import KINDS, Fault, draw_fault, kinds_of
 from rrru.studies.blind_validation.chunks import Member
-from rrru.studies.blind_validation.draw import MANY
-from rrru.studies.blind_validation.faults import KINDS, Fault, draw_fault, kinds_of
-from rrru.studies.blind_validation.members import drawn, robot_of
 from rrru.studies.blind_validation.noise import NoiseModel
 from rrru.studies.blind_validation.parts import parts
-from rrru.studies.blind_validation.plants import mujoco
+from rrru.studies.blind_validation.robots import mujoco_plant
 from rrru.studies.blind_validation.verdicts import NONE, PREFIX
 from tests.studies.blind_validation.files import FILES, conditions, short
 
@@ -44,7 +42,7 @@ def _moved(file, fault, offsets=None):
     """What a fault does to the positions on our own plant and on MuJoCo's, (m, 3) each."""
     known = conditions(file)
     for plant in ("own", "mujoco"):
-        read = [foreign.noise_free(short(plant, file, acting, offsets), known) for acting in ((fault,), ())]
+        read = [robots.noise_free(short(plant, file, acting, offsets), known) for acting in ((fault,), ())]
         yield rows.measured(read[0]) - rows.measured(read[1])
 
 
@@ -70,7 +68,7 @@ def test_every_fault_has_its_places_in_the_file(file):
     assert {"play", "soft_servo", "slow_servo", "length", "base_on_springs", "speed_friction"} <= kinds
     for kind in kinds:
         for seed in range(4):
-            mujoco(known, short("mujoco", file).offsets, _fault(file, kind, seed)).machine(3.0)
+            mujoco_plant(known, short("mujoco", file).offsets, _fault(file, kind, seed)).machine(3.0)
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -82,7 +80,7 @@ def test_the_right_answer_is_a_law_that_the_diagnosis_tries_or_none(kind):
     elif KINDS[kind].effect_model is None:
         assert fault.truth == NONE and not fault.effect
         own = short("own", file, (fault,))
-        gap = np.linalg.norm(foreign.residual(foreign.noise_free(own, conditions(file)), conditions(file)), axis=1)
+        gap = np.linalg.norm(robots.residual(robots.noise_free(own, conditions(file)), conditions(file)), axis=1)
         assert gap.max() < 0.1 * conditions(file).noise_mm
     else:
         effect, values = fault.values(robot)
@@ -104,17 +102,17 @@ def test_one_place_means_that_place_alone():
 def test_a_robot_is_its_seed_as_strong_as_it_says_and_survives_as_text():
     known = conditions("hexapod_file")
     member = Member("own", "hexapod_file", 2)
-    robot, measurements = foreign.draw(member, known)
-    again, same = foreign.draw(member, known)
+    robot, measurements = draw.draw_file_robot(member, known)
+    again, same = draw.draw_file_robot(member, known)
     assert robot == again and measurements.equals(same)
     assert robot.cause == "soft_servo" and robot.truth == "drive_compliance"
     (fault,) = robot.acting
     # the last step towards it is along a linear effect
-    assert 0.9 * foreign.WEAKEST < fault.strength < 1.1 * foreign.STRONGEST
-    twice = foreign.as_driven(replace(robot, acting=(fault.scaled(2.0),)), known)[0].acting[0]
+    assert 0.9 * draw.FILE_STRENGTHS[0] < fault.strength < 1.1 * draw.FILE_STRENGTHS[1]
+    twice = draw.as_driven(replace(robot, acting=(fault.scaled(2.0),)), known)[0].acting[0]
     np.testing.assert_allclose(twice.strength, 2.0 * fault.strength, rtol=0.02)
     answer = robot.answer(known)
-    assert robot_of(answer["drawn"]) == robot and json.loads(answer["drawn"])["plant"] == "own"
+    assert robots.robot_of(answer["drawn"]) == robot and json.loads(answer["drawn"])["plant"] == "own"
     # what it leaves in the noise-free residual is what the oracle finds in the noisy one
     count = len(measurements) * 3 * fault.strength**2
     np.testing.assert_allclose(robot.oracle_chi2, count, rtol=0.2)
@@ -124,20 +122,20 @@ def test_a_robot_is_its_seed_as_strong_as_it_says_and_survives_as_text():
 
 def test_a_campaign_has_what_tells_causes_apart_and_fresh_runs_go_elsewhere():
     known = conditions("rrru3_file")
-    robot, measurements = foreign.draw(Member("own", "rrru3_file", 1), known)
+    robot, measurements = draw.draw_file_robot(Member("own", "rrru3_file", 1), known)
     assert robot.cause == NONE and not robot.acting and len(measurements) <= 220
     assert set(measurements["speed_mm_s"]) == {40.0, 120.0} and set(measurements["payload_kg"]) == {0.0, 3.0}
     assert set(rows.direction(measurements)) == {-1, 1}
-    elsewhere = foreign.fresh(robot, known).plan(known).targets()
+    elsewhere = draw.fresh(robot, known).plan(known).targets()
     assert np.abs(elsewhere - robot.plan(known).targets()).max() > 5.0
-    assert np.linalg.norm(foreign.residual(measurements, known), axis=1).mean() < 2.0 * known.noise_rms_mm
+    assert np.linalg.norm(robots.residual(measurements, known), axis=1).mean() < 2.0 * known.noise_rms_mm
 
 
 def test_a_fault_that_the_calibration_takes_up_cannot_be_sized():
     """Legs that always push never change sides of their clearance: it is a length."""
     fault = Fault("clearance", (0.1,) * 6, {})
     with pytest.raises(UnreachableError, match="a calibration absorbs clearance"):
-        foreign.sized(short("own", "hexapod_file"), fault, 3.0, conditions("hexapod_file"))
+        draw.sized(short("own", "hexapod_file"), fault, 3.0, conditions("hexapod_file"))
 
 
 def test_a_fault_that_nobody_has_is_none():
@@ -156,20 +154,20 @@ def test_a_fault_that_nobody_has_is_none():
 @pytest.mark.parametrize(("file", "number"), [("hexapod_file", 1), ("arm6_file", 2), ("hexapod_file", 3)])
 def test_a_robot_of_a_file_as_robots_are_has_several_causes_of_its_own(file, number):
     known, member = conditions(file), Member("as_robots_are", file, number)
-    robot, measurements = drawn(member, known)
-    assert robot == drawn(member, known)[0] and robot.plant == "own" and robot.noise
+    robot, measurements = draw.drawn(member, known)
+    assert robot == draw.drawn(member, known)[0] and robot.plant == "own" and robot.noise
     outside = [one for one in robot.acting if one.outside]
     assert len(outside) == (number % 3 == 1) and 1 <= len(robot.acting) - len(outside) <= 6
     for one in robot.acting:
-        assert 0.9 * MANY[0] < one.strength < 1.1 * MANY[1]
-        alone = foreign.gap_over_noise(replace(robot, acting=(one,)), known)
+        assert 0.9 * draw.MANY[0] < one.strength < 1.1 * draw.MANY[1]
+        alone = robots.gap_over_noise(replace(robot, acting=(one,)), known)
         np.testing.assert_allclose(alone, one.strength, rtol=1e-9)
     answer = robot.answer(known)
-    assert robot_of(answer["drawn"]) == robot and answer["weakest"] == min(one.strength for one in robot.acting)
+    assert robots.robot_of(answer["drawn"]) == robot and answer["weakest"] == min(one.strength for one in robot.acting)
     assert answer["truth"] == "+".join(sorted(one.truth for one in robot.acting))
     assert set(robot.numbers(known)) == {one.effect for one in robot.acting if not one.outside}
     # noise as it was drawn, beyond the stated one
-    off = rows.measured(measurements) - rows.measured(foreign.noise_free(robot, known))
+    off = rows.measured(measurements) - rows.measured(robots.noise_free(robot, known))
     assert off.std() > 1.05 * known.noise_mm
     listed = parts(robot, "none", _budget(), known.noise_rms_mm).set_index("part")
     for one in robot.acting:
@@ -179,9 +177,9 @@ def test_a_robot_of_a_file_as_robots_are_has_several_causes_of_its_own(file, num
 
 def test_axes_of_a_robot_of_a_file_as_robots_are_are_found_by_its_calibration():
     known = conditions("arm6_file")
-    robot = several.bare(Member("as_robots_are", "arm6_file", 0), np.random.default_rng(4), known)
+    robot = draw.bare_file_robot(Member("as_robots_are", "arm6_file", 0), np.random.default_rng(4), known)
     assert len(robot.offsets) == len(known.mechanism.candidates) and min(map(abs, robot.offsets)) > 0.0
-    left = foreign.residual(foreign.noise_free(robot, known), known)
+    left = robots.residual(robots.noise_free(robot, known), known)
     assert np.linalg.norm(left, axis=1).max() < 0.1 * known.noise_mm
 
 

@@ -9,9 +9,10 @@ import pytest
 from rrru.campaign import measurements as rows
 from rrru.diagnosis.diagnose import MeasuredRobot, diagnose
 from rrru.diagnosis.settings import GapSettings
+from rrru.studies.blind_validation.causes import Acting
 from rrru.studies.blind_validation.noise import NOISES, NoiseModel
 from rrru.studies.blind_validation.parts import is_enough, parts
-from rrru.studies.blind_validation.robots import Acting, noise_free
+from rrru.studies.blind_validation.robots import noise_free
 from rrru.studies.blind_validation.summary import summary
 from tests.schemas import TABLES, check
 from tests.studies.blind_validation.conditions import CONDITIONS, bare

@@ -13,18 +13,22 @@ from rrru.diagnosis.make_problem import make_case
 from rrru.diagnosis.state import State
 from rrru.effects.library import library
 from rrru.errors import ConfigError
-from rrru.studies.blind_validation import draw
-from rrru.studies.blind_validation.field import field_verdicts, read_field_answers, score_field
-from rrru.studies.blind_validation.members import Known
-from rrru.studies.blind_validation.oracle import limits, with_truth
-from rrru.studies.blind_validation.outside import EFFECTS
+from rrru.studies.blind_validation.causes import EFFECTS
 from rrru.studies.blind_validation.robots import noise_free
-from rrru.studies.blind_validation.score import _rivals, score_chunk
-from rrru.studies.blind_validation.states import state_of, state_row
-from rrru.studies.blind_validation.summary import calibration_error, confusion, summary, wilson
+from rrru.studies.blind_validation.score import Known, _rivals, limits, score_chunk, with_truth
+from rrru.studies.blind_validation.stated import state_of, state_row
+from rrru.studies.blind_validation.summary import (
+    calibration_error,
+    confusion,
+    field_verdicts,
+    read_field_answers,
+    score_field,
+    summary,
+    wilson,
+)
 from rrru.studies.blind_validation.verdicts import is_right
 from tests.schemas import TABLES, check
-from tests.studies.blind_validation.conditions import CONDITIONS, bare
+from tests.studies.blind_validation.conditions import CONDITIONS, acting, bare
 
 _LIBRARY = library(CONDITIONS.mechanism)
 _PART = {"part": "backlash", "kind": "effect", "rms_mm": 0.07, "probability": 0.99}
@@ -36,10 +40,9 @@ _STATED = {"effect": "backlash", "probability": 0.99, "decision": "named", "grou
 def robots():
     """A robot with backlash on leg 2 of twice the noise, and one with nothing: robot, measurements, calibration."""
     robot = bare(7)
-    acting = draw.draw_acting(robot, "backlash", False, (2.0, 2.001), np.random.default_rng(3), CONDITIONS)
-    acting = replace(acting, leg=2, coordinates=(0.0, 6e-4, 0.0))
+    backlash = replace(acting(robot, "backlash", seed=3), leg=2, coordinates=(0.0, 6e-4, 0.0))
     result = {}
-    for made in (replace(robot, name="sound"), replace(robot, name="faulty", acting=(acting,))):
+    for made in (replace(robot, name="sound"), replace(robot, name="faulty", acting=(backlash,))):
         measurements, _ = made.campaign(CONDITIONS).run()
         fit = calibrate(select(measurements, CONDITIONS.mechanism, ["*"]))
         result[made.name] = (made, measurements, fit.deviations)

@@ -1,6 +1,7 @@
 """Pages of own robots judged sentence by sentence: what is judged against; every judge can say true and false."""
 
 import numpy as np
+import pandas as pd
 import pytest
 from scipy.spatial.transform import Rotation
 
@@ -362,8 +363,8 @@ def test_every_kind_is_the_robot_that_its_file_says(tmp_path):
 def test_files_are_read_again_without_the_package(tmp_path, kind, form):
     from types import SimpleNamespace
 
-    from rrru.studies.blind_validation.sentences.files import file_poses
     from rrru.studies.blind_validation.sentences.kinds import KINDS
+    from rrru.studies.blind_validation.sentences.truth import file_poses
 
     robot = KINDS[kind](np.random.default_rng(2))
     values = robot.spans.mean(axis=1) + 0.2 * np.random.default_rng(5).uniform(-1, 1, (4, len(robot.units))) * np.ptp(
@@ -382,20 +383,19 @@ def test_mujoco_drives_what_numpy_says(monkeypatch):
     """Without errors of its seats a gantry stands where its drives are, and lags by half its play."""
     from dataclasses import replace
 
-    from rrru.studies.blind_validation.sentences import driven
+    from rrru.studies.blind_validation.sentences import draws
     from rrru.studies.blind_validation.sentences.causes import Cause, Stops
-    from rrru.studies.blind_validation.sentences.draws import draw
 
-    monkeypatch.setattr(driven, "_LENGTH_MM", 0.0)
-    monkeypatch.setattr(driven, "_ANGLE_RAD", 0.0)
-    own = draw(9, 8, 60, 1.0)
+    monkeypatch.setattr(draws, "_LENGTH_MM", 0.0)
+    monkeypatch.setattr(draws, "_ANGLE_RAD", 0.0)
+    own = draws.draw(9, 8, 60, 1.0)
     assert own.plant == "mujoco" and own.robot_kind == "gantry3"
     drive = np.array([[0.0, 0.0, 0.0], [30.0, -20.0, 25.0], [10.0, 5.0, 5.0]])
     stops = Stops(drive, np.zeros(3), np.arange(3.0), np.zeros(3, dtype=bool))
     own = replace(own, stops=stops, cause=Cause("backlash", (0.3, 0.2, 0.0)))
     lagged = own.cause.at_drives(own.nominal, stops)
     np.testing.assert_allclose(lagged[1:], [[-0.15, 0.1, 0.0], [0.15, -0.1, 0.0]])
-    found = driven.driven(own)
+    found = draws.driven(own)
     for acts, off in ((False, 0.0), (True, lagged)):
         place, _ = own.nominal.poses(drive + own.zeros + off)
         # friction and the weight of what hangs on a servo leave some micrometres
@@ -419,6 +419,31 @@ def test_statements_are_the_same_again_and_nothing_is_of_an_unknown_kind():
     table = sentences(stated).set_index("kind")
     assert table[["true", "false", "undecided"]].to_numpy().sum() == len(stated)
     assert table.loc["verdict", "example_true"].startswith("gantry3_0009") or not table.loc["verdict", "true"]
+
+
+def test_a_judged_page_is_what_the_library_answers(tmp_path):
+    """A gantry of a URDF, its frame registered, its base drifting."""
+    import rrru
+    from rrru.store import json_files
+    from rrru.studies.blind_validation.sentences import page
+    from rrru.studies.blind_validation.sentences.draws import draw
+
+    own = draw(29, 4, 70, 0.0)
+    rows = own.table(own.readings(own.poses()), True)[np.repeat(~own.stops.fresh, len(own.targets))]
+    own.write(tmp_path, rows, "stops.csv")
+    section, robot = own.section(tmp_path, "stops.csv"), own.nominal.section(str(tmp_path / own.robot_file), own.kind)
+    found = page.run(own.name, section, robot, {})
+    stated = {key: value for key, value in section.items() if key not in ("robot", "ingest")}
+    campaign = rrru.read_campaign(section["ingest"], rrru.load_robot(robot, name="own"), name=own.name, **stated)
+    answer = rrru.diagnose(campaign).write_corrected(tmp_path / "mine.urdf")
+    assert json_files.text(found.page.facts) == answer.to_json()
+    assert found.page.corrected.read_text() == (tmp_path / "mine.urdf").read_text()
+    assert found.page.read == campaign.notes
+    assert {name for name in answer.tables if len(answer.tables[name])} >= {"gap_parameters", "corrected_drives"}
+    for name, table in found.page.tables.items():
+        pd.testing.assert_frame_equal(table, answer.tables[name][list(table.columns)], check_exact=True)
+    # the true frame, but for the robot's own errors
+    np.testing.assert_allclose(found.rotation @ own.frame[0], np.eye(3), atol=5e-3)
 
 
 def test_a_mistake_is_judged_by_the_words_that_it_gets(tmp_path):

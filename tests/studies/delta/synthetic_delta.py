@@ -5,7 +5,7 @@ anything.
 import numpy as np
 import pandas as pd
 
-from tests.schemas import TABLES, check
+from tests.schemas import check, filled
 
 VARIANTS = ("none", "paper", "converged", "shape", "tracker_positions", "of_my_own")
 
@@ -82,10 +82,8 @@ def points():
 def calibrations(point_rows):
     """`delta_calibrations` that fit the points."""
     sizes = point_rows.groupby("variant", sort=False)[["error_mm", "base_error_mm"]].agg(["mean", "max"])
-    numbers = dict.fromkeys((c.name for c in TABLES["delta_calibrations"].columns if c.nullable), np.nan)
     rows = [
-        numbers
-        | {"variant": name, "source": "none", "measure": "none", "planes": "none", "poses": 20}
+        {"variant": name, "source": "none", "measure": "none", "planes": "none"}
         | {
             f"{frame}_{kind}_mm": row[column, kind]
             for frame, column in (("plane", "error_mm"), ("base", "base_error_mm"))
@@ -93,7 +91,7 @@ def calibrations(point_rows):
         }
         for name, row in sizes.iterrows()
     ]
-    return check("delta_calibrations", pd.DataFrame(rows))
+    return filled("delta_calibrations", rows)
 
 
 def draws(rows):
@@ -110,18 +108,15 @@ def observability():
         {
             "variant": name,
             "direction": k + 1,
-            **{f"weight_dtheta{leg}": 0.577 for leg in (1, 2, 3)},
             "common_share": 0.99 if k == 0 else 0.005,
             "kind": "common" if k == 0 else "differential",
             "singular_value": 0.8 / 4.0**k,
             "standard_error_rad": 2e-4 * 4.0**k,
-            "per_length_rad_mm": 0.005 * (k + 1.0),
-            "per_scale_rad": np.nan if name.startswith("tracker") else 1e-4,
         }
         for name in VARIANTS[1:]
         for k in range(3)
     ]
-    return check("delta_observability", pd.DataFrame(rows))
+    return filled("delta_observability", rows)
 
 
 def delta_tables():

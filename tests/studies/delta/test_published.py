@@ -4,8 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from rrru.studies.delta import paper
-from rrru.studies.delta.published import published_rows
+from rrru.studies.delta.published import NUMBERS, published_rows
 from tests.schemas import check
 
 SECTION = {
@@ -17,8 +16,8 @@ SECTION = {
 
 
 def test_the_numbers_are_the_printed_ones():
-    c = {number.item: number.value for number in paper.NUMBERS}
-    assert len(paper.NUMBERS) == len(c) == 19
+    c = {number.item: number.value for number in NUMBERS}
+    assert len(NUMBERS) == len(c) == 19
     assert (c["before_max"], c["before_mean"], c["after_max"], c["after_mean"]) == (1.442, 0.932, 0.374, 0.211)
     assert (c["poses"], c["least_poses"], c["calibration_height_mm"], c["checked_height_mm"]) == (20, 4, 100, 0)
     assert (c["target_dots_across"], c["target_dots_along"], c["dot_diameter_mm"], c["dot_pitch_mm"]) == (40, 55, 5, 10)

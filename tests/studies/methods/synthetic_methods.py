@@ -2,7 +2,7 @@
 
 import pandas as pd
 
-from tests.schemas import check
+from tests.schemas import filled
 
 _METHODS = (
     "zero_offsets",
@@ -34,14 +34,7 @@ def method_tables():
                         "after_mean_mm": after,
                         "after_max_mm": 3.0 * after,
                     }
-                    counts = {"points": points, "numbers": 7, "measuring_time_s": 3.0 * points, "evaluations": 100}
-                    rows.append({"robot": robot, "method": method, "test": test} | sizes | counts)
+                    rows.append({"robot": robot, "method": method, "test": test, "points": points} | sizes)
     curve = pd.DataFrame(rows)
     last = curve.loc[curve.groupby(["robot", "method", "test"])["points"].idxmax()].reset_index(drop=True)
-    more = {
-        "removed_share": 1.0 - last["after_mean_mm"] / last["before_mean_mm"],
-        "points_needed": 10,
-        "needed_time_s": 30.0,
-        "needs": "positions",
-    }
-    return {"methods": check("methods", last.assign(**more)), "method_points": check("method_points", curve)}
+    return {"methods": filled("methods", last), "method_points": filled("method_points", curve)}

@@ -1,9 +1,8 @@
 """A made-up table of printers, for drawing it without calibrating any."""
 
 import numpy as np
-import pandas as pd
 
-from tests.schemas import check
+from tests.schemas import filled
 
 
 def printers(count=8, verdicts=("reproduced", "does not belong", "reproduced", "not fitted")):
@@ -17,31 +16,17 @@ def printers(count=8, verdicts=("reproduced", "does not belong", "reproduced", "
             "radius_fitted_mm": 150.0,
             "radius_saved_mm": 150.0 + size,
             "noise_mm": 0.03,
-            "suspect_p": np.nan,
-            "effector_tilt_p": np.nan,
-            "effector_tilt_power": np.nan,
-        }
-        numbers |= {
             "largest_difference": size * (k + 1),
             "largest_over_stop": 1e4 * size,
             "common_arm_standard_error_mm": 3.0 + k,
             "dense_common_arm_standard_error_mm": 0.8,
+            "height_rms_fitted_mm": 0.02 + 0.01 * k,
+            "height_rms_saved_mm": 0.03 + 0.01 * k + size,
         }
-        numbers |= {"height_rms_fitted_mm": 0.02 + 0.01 * k, "height_rms_saved_mm": 0.03 + 0.01 * k + size}
         caliper = {"distance_rms_fitted_mm": 0.08, "distance_rms_saved_mm": 0.08 + size, "arm_standard_error_mm": 0.9}
-        numbers |= caliper if distances else dict.fromkeys(caliper, np.nan)
+        untested = dict.fromkeys(("suspect_p", "effector_tilt_p", "effector_tilt_power"), np.nan)
+        numbers |= untested | (caliper if distances else dict.fromkeys(caliper, np.nan))
         if verdict == "not fitted":
             numbers = dict.fromkeys(numbers, np.nan)
-        texts = {
-            "source": "",
-            "evidence": "printer_01",
-            "largest_difference_in": "radius",
-            "reason": "",
-            "suspect": "",
-            "cause": "not decidable",
-            "effector_tilt": "",
-            "notes": "",
-        }
-        counts = {"heights": 7, "distances": distances, "numbers": 6, "freedom": 1, "rank": 6}
-        rows.append({"printer": f"printer_{k + 1:02d}", "verdict": verdict} | numbers | texts | counts)
-    return check("printers", pd.DataFrame(rows))
+        rows.append({"printer": f"printer_{k + 1:02d}", "verdict": verdict, "distances": distances} | numbers)
+    return filled("printers", rows)

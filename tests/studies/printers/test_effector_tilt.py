@@ -5,8 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from rrru.studies.printers import printer_fit
-from rrru.studies.printers.effector_tilt import TiltTest, tilts
-from rrru.studies.printers.tilt_answers import tilt_answer
+from rrru.studies.printers.effector_tilt import TiltTest, tilt_answer, tilts
 from tests.studies.printers.drawn_printers import JOINTS_MM, SPACING_MM, Drawn, rings
 from tests.studies.printers.simulated_printers import LEVEL, STEP
 

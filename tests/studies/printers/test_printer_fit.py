@@ -7,7 +7,7 @@ import pytest
 
 from rrru.calibration.calibrate import calibrate
 from rrru.errors import FitError
-from rrru.studies.printers import firmware, printer_fit, printer_tables, saved_answers, steps
+from rrru.studies.printers import firmware, judge, printer_fit, printer_tables, steps
 from rrru.studies.printers.printer import Refused
 from tests.schemas import check
 from tests.studies.printers.simulated_printers import (
@@ -32,14 +32,12 @@ def test_the_answer_is_that_of_another_refit_and_belongs_where_the_file_is_consi
     result = printer_fit.fit_printer(PRINTERS[name], STEP, LEVEL)
     other = ENTRIES[name]["refit_max_difference"]
     assert np.abs(result.saved - result.fitted).max() == pytest.approx(other, rel=0.01, abs=3e-6)
-    assert (saved_answers.reason(result) == "") == (other < 5e-4)
+    assert (judge.reason(result) == "") == (other < 5e-4)
     assert result.fit.identifiability.rank == len(result.names) == (9 if ENTRIES[name]["distances"] else 6)
 
 
 def test_why_an_answer_does_not_belong():
-    reasons = {
-        name: saved_answers.reason(printer_fit.fit_printer(printer, STEP, LEVEL)) for name, printer in PRINTERS.items()
-    }
+    reasons = {name: judge.reason(printer_fit.fit_printer(printer, STEP, LEVEL)) for name, printer in PRINTERS.items()}
     foreign = {name: text for name, text in reasons.items() if text}
     words = {
         "printer_04": "overwritten after the calibration: endstop_a, endstop_b, endstop_c;",
@@ -71,7 +69,7 @@ def test_why_an_answer_does_not_belong():
 )
 def test_what_an_owner_changed_afterwards_is_named(change, words):
     try:
-        found = saved_answers.reason(printer_fit.fit_printer(change(HEIGHTS), STEP, LEVEL))
+        found = judge.reason(printer_fit.fit_printer(change(HEIGHTS), STEP, LEVEL))
     except FitError as error:
         # with wrong steps there may be no answer at all
         found = str(error)
@@ -83,7 +81,7 @@ def test_a_reading_that_was_changed_afterwards_is_named_with_what_it_was(printer
     heights, distances = printer.height_mm.copy(), printer.distance_mm.copy()
     kind, at = (heights, number) if number < 7 else (distances, number - 7)
     before, kind[at] = kind[at], kind[at] + 0.4
-    found = saved_answers.reason(
+    found = judge.reason(
         printer_fit.fit_printer(replace(printer, height_mm=heights, distance_mm=distances), STEP, LEVEL)
     )
     assert f"{'height' if number < 7 else 'distance'} {at + 1} with {before:.3f} mm" in found
@@ -220,7 +218,7 @@ def test_a_mistyped_reading_in_a_real_file_is_flagged_and_said_to_be_changed():
 
 def reason(printer):
     """Why a printer's saved answer does not belong."""
-    return saved_answers.reason(printer_fit.fit_printer(printer, STEP, LEVEL))
+    return judge.reason(printer_fit.fit_printer(printer, STEP, LEVEL))
 
 
 @pytest.mark.parametrize("factor", [0.125, 0.25, 0.5, 2.0, 4.0, 8.0])

@@ -6,22 +6,13 @@ import numpy as np
 import pandas as pd
 
 from rrru.studies.ptt3.learning import METHODS as _METHODS
-from tests.schemas import TABLES, check
+from tests.schemas import check, filled
 
 METHODS = tuple(_METHODS)
 EXPERIMENTS = tuple(f"ptt_{k}" for k in range(1, 6))
 _POINTS = 24
 _NO_RANGE = {"benefit_low_percent": np.nan, "benefit_high_percent": np.nan}
 _AXES = ("x", "y", "z", "z_mean", "z_absolute")
-
-
-def _filled(name, rows, generator):
-    """Rows with every column that they lack drawn at random, as the schema wants it."""
-    frame = pd.DataFrame(rows)
-    for column in TABLES[name].columns:
-        if column.name not in frame:
-            frame[column.name] = 0.05 * generator.standard_normal(len(frame))
-    return check(name, frame)
 
 
 def _points(generator):
@@ -33,7 +24,7 @@ def _points(generator):
         | {f"command_{axis}_mm": values[k] for axis, values in place.items()}
         for name, k in product(EXPERIMENTS, range(_POINTS))
     ]
-    return _filled("ptt_points", rows, generator)
+    return filled("ptt_points", rows, generator)
 
 
 def _grid():
@@ -88,7 +79,7 @@ def _bench(generator):
         for leg, done in product((1, 2, 3), (False, True))
     ]
     tables = {"ptt_encoder": encoder, "ptt_backlash": widths, "ptt_repeatability": scatter}
-    return {name: _filled(name, rows, generator) for name, rows in tables.items()}
+    return {name: filled(name, rows, generator) for name, rows in tables.items()}
 
 
 def _networks():
@@ -100,12 +91,8 @@ def _networks():
         label = {"experiment": name, "spread_from": source, "learns": learns, "spread_mm": size}
         errors = dict.fromkeys(("train_mse_mm2", "validation_mse_mm2", "test_mse_mm2"))
         training += [label | {"neurons": k} | dict.fromkeys(errors, 0.1 * 0.6**k) for k in range(15)]
-        rms = dict.fromkeys(("train_rms_mm", "validation_rms_mm", "test_rms_mm"), 0.002)
-        spread.append(label | {"chosen": source == "candidate" and size == 60.0, "neurons": 10} | rms)
-    return {
-        "ptt_training": check("ptt_training", pd.DataFrame(training)),
-        "ptt_spread": check("ptt_spread", pd.DataFrame(spread)),
-    }
+        spread.append(label | {"chosen": source == "candidate" and size == 60.0, "neurons": 10})
+    return {"ptt_training": filled("ptt_training", training), "ptt_spread": filled("ptt_spread", spread)}
 
 
 def _benefits(generator):
@@ -132,7 +119,7 @@ def _benefits(generator):
         for name, angle, axis in product(EXPERIMENTS, (0.0, 120.0, 240.0), _AXES)
     ]
     rows = {"ptt_benefit": benefit, "ptt_start": start, "ptt_extrapolation": away}
-    return {name: _filled(name, part, generator) for name, part in rows.items()}
+    return {name: filled(name, part, generator) for name, part in rows.items()}
 
 
 def ptt_tables():
@@ -145,7 +132,7 @@ def ptt_tables():
     return {
         "ptt_points": _points(generator),
         "ptt_singularity": _grid(),
-        "ptt_corrections": _filled("ptt_corrections", corrections, generator),
+        "ptt_corrections": filled("ptt_corrections", corrections, generator),
         **_bench(generator),
         **_networks(),
         **_benefits(generator),

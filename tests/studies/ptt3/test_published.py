@@ -4,8 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from rrru.studies.ptt3 import paper
-from rrru.studies.ptt3.published import published_rows
+from rrru.studies.ptt3.published import NUMBERS, published_rows
 from tests.schemas import check
 
 SECTION = {
@@ -19,8 +18,8 @@ SECTION = {
 
 
 def test_the_numbers_are_the_printed_ones():
-    b = {number.item: number.value for number in paper.NUMBERS}
-    assert len(paper.NUMBERS) == len(b) == 39
+    b = {number.item: number.value for number in NUMBERS}
+    assert len(NUMBERS) == len(b) == 39
     assert [b[f"spread_{k}"] for k in range(1, 6)] == [3.8, 3.4, 3.4, 3.6, 3.5]
     assert (b["points"], b["training_points"], b["test_points"], b["training_steps"]) == (180, 160, 20, 20)
     assert (b["repeats"], b["screw_turns"], b["encoder_range_mm"], b["encoder_accuracy_um"]) == (7, 10, 300, 1)

@@ -6,7 +6,7 @@ import pytest
 
 from rrru.calibration.lengths import fit_lengths, refit
 from rrru.errors import ConfigError, FitError, IngestError
-from rrru.studies.real import belts, figures_lengths
+from rrru.studies.real import belts, figures
 from rrru.studies.real.lengths_section import Section
 from tests.refusals import refusals
 from tests.studies.real import simulated_lengths as simulated
@@ -138,7 +138,7 @@ def test_figure_draws_every_set():
     joined = {
         name: pd.concat([one[name].assign(campaign=f"run {k}") for k, one in enumerate(tables)]) for name in tables[0]
     }
-    figure = figures_lengths.lengths(joined, {})
+    figure = figures.lengths(joined, {})
     assert len(figure.axes) == 6
 
 

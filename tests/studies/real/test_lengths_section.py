@@ -4,7 +4,7 @@ import pandas as pd
 import pytest
 
 from rrru.errors import ConfigError, IngestError
-from rrru.studies.real import belts, figures_lengths
+from rrru.studies.real import belts, figures
 from rrru.studies.real.lengths_section import Section, held_out, row_numbers
 
 READ = Section({"files": "run_x.csv"}, "mine", ("files",), ())
@@ -40,5 +40,5 @@ def test_belts_have_columns_of_their_own_and_are_longer_than_high(key, change):
 
 def test_a_set_without_files_has_a_page_that_says_so():
     tables = {name: pd.DataFrame(columns=["campaign"]) for name in ("real_points", "real_parameters")}
-    (text,) = figures_lengths.lengths(tables, {"set": "mine"}).texts
+    (text,) = figures.lengths(tables, {"set": "mine"}).texts
     assert text.get_text() == "mine: no usable file of this set was found"

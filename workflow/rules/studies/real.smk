@@ -12,7 +12,7 @@ ARM_FIGURES = {
     "steps": ("rrru.studies.real.figures:steps", ["real_verdicts", "real_steps", "real_budget"]),
     "spectrum": ("rrru.studies.real.figures:spectrum", ["real_spectrum"]),
 }
-LENGTH_FIGURES = {"lengths": ("rrru.studies.real.figures_lengths:lengths", ["real_points", "real_parameters"])}
+LENGTH_FIGURES = {"lengths": ("rrru.studies.real.figures:lengths", ["real_points", "real_parameters"])}
 
 
 # series of the arms' sets by name of the set

@@ -10,6 +10,8 @@ WITHHELD_ADVICE = ["withheld_advice", "withheld_advice_summary"]
 WITHHELD_HIDDEN = [name for name, members in WITHHELD.items() if any(member.check == "label" for member in members)]
 # statements of pages of own robots, and gross mistakes in files
 STATEMENTS = statement_chunks(config["withheld"]["sentences"])
+# of the calibration's settings, what the jobs read that a page needs
+PAGE_CALIBRATION = [f"calibration.{key}" for key in ("sets", "bounds", "singularity_margin", "use_near_singularity")]
 WITHHELD_FIGURES = {
     "withheld": (
         "rrru.studies.blind_validation.figures:withheld",
@@ -185,7 +187,7 @@ rule withheld_statements:
     params:
         settings=lambda wildcards: {
             "chunk": STATEMENTS[wildcards.chunk],
-            **reads("seed", "gap", "calibration.singularity_margin"),
+            **reads("seed", "gap", *PAGE_CALIBRATION),
             **reads("withheld.sentences.stops", "withheld.sentences.mujoco_share"),
         },
         own_effects=own_effects_digests(),

@@ -2,13 +2,17 @@
 
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 import pandas as pd
 from scipy.spatial.transform import Rotation
 
 from rrru.errors import UnreachableError
+from rrru.robots.catalogue import make_mechanism
 from rrru.seeds import stream
+from rrru.studies.blind_validation.causes import draw_log_uniform
+from rrru.studies.blind_validation.models import TARGETS_MM
 from rrru.studies.blind_validation.sentences.causes import MUJOCO, NAMES, Cause, Stops, draw_cause
 from rrru.studies.blind_validation.sentences.kinds import KINDS
 
@@ -19,13 +23,12 @@ _ZERO = {"rad": 0.002, "mm": 0.3}
 _FRAME_MM, _FRAME_RAD = 0.2, 2e-4
 NOISE_MM, NOISE_RAD = (0.01, 0.05), 2e-5
 # rms displacement of a cause over the noise
-_WEAKEST, _STRONGEST = 2.0, 25.0
+_STRENGTHS = (2.0, 25.0)
 _FEWEST, _FRESH, _AGAIN = 60, 200, 10
 _SETTLED_S = 8.0
 _PAYLOAD_KG = 5.0
 # what is measured: tool, targets with stated places, targets with places to find, pose
 READINGS = ("tool", "stated", "found", "pose")
-_TARGETS_MM = {"a": (60.0, 0.0, 40.0), "b": (-50.0, 60.0, 40.0), "c": (-40.0, -70.0, 60.0)}
 _INSIDE = 0.9
 # first size of a cause, small enough for a linear displacement, and number of rescalings
 _SMALL, _SIZINGS = 1e-6, 3
@@ -61,7 +64,7 @@ class Draw:
     @property
     def targets(self):
         """Places (3,) of the measured targets on the platform, by name."""
-        return {"": (0.0, 0.0, 0.0)} if self.reading in ("tool", "pose") else _TARGETS_MM
+        return {"": (0.0, 0.0, 0.0)} if self.reading in ("tool", "pose") else TARGETS_MM
 
     def poses(self, cause=True, stops=None):
         """Exact positions (n, 3) and rotations (n, 3, 3) of the platform, robot frame; cause: whether it acts."""
@@ -141,7 +144,7 @@ def draw(number, seed, most_stops, mujoco_share):
         names = [*MUJOCO] if plant == "mujoco" else [name for name in NAMES if _fits(name, own.nominal)]
         if generator.random() < _ACTING:
             cause = draw_cause(str(generator.choice(names)), own.nominal, generator)
-            own = _sized(own, cause, float(np.exp(generator.uniform(*np.log([_WEAKEST, _STRONGEST])))))
+            own = _sized(own, cause, draw_log_uniform(_STRENGTHS, generator))
         if np.isfinite(replace(own, plant="numpy").poses()[0]).all() and not (
             own.cause and own.cause.beyond(own.nominal)
         ):
@@ -157,7 +160,7 @@ def _still(number, seed, plant, most_stops, generator):
     zeros = np.array([_ZERO[unit] for unit in nominal.units]) * generator.standard_normal(len(nominal.units))
     registered = bool(generator.random() < 0.5)
     # MuJoCo needs long from stop to stop
-    count = _FEWEST if plant == "mujoco" else int(np.exp(generator.uniform(*np.log([_FEWEST, most_stops]))))
+    count = _FEWEST if plant == "mujoco" else int(draw_log_uniform((_FEWEST, most_stops), generator))
     reading = str(generator.choice(READINGS))
     # with a constant orientation, frame and tool are confounded
     reading = "tool" if reading in ("pose", "found") and not _turns(nominal) else reading
@@ -174,7 +177,7 @@ def _still(number, seed, plant, most_stops, generator):
         reading=reading,
         frame=_frame(generator, registered),
         registered=registered,
-        noise_mm=float(np.exp(generator.uniform(*np.log(NOISE_MM)))),
+        noise_mm=draw_log_uniform(NOISE_MM, generator),
         seed=seed,
     )
 
@@ -231,3 +234,72 @@ def _stops(robot, count, plant, generator):
     time = _SETTLED_S * np.arange(len(drive))
     time[is_fresh] = np.linspace(0.0, time[count - 1], is_fresh.sum())
     return Stops(drive, payload, time, is_fresh)
+
+
+# --- robots that MuJoCo drives
+
+
+@dataclass(frozen=True)
+class DriveList:
+    """The input of `rrru.simulation.mujoco_run.Machine.drive`: linear in the drives from stop to stop."""
+
+    path_drive: np.ndarray
+    path_index: np.ndarray
+    payload_kg: np.ndarray
+    time_s: np.ndarray
+    drive_rate: np.ndarray
+    position_mm: np.ndarray
+
+
+def _mujoco_poses(draw, cause):
+    """Positions (n, 3) and rotations (n, 3, 3) of the platform of a Draw at its stops under a Cause or none.
+
+    The model has errors of the seats in its file. Raises SimulationError where it does not come to rest.
+    """
+    # a large import that most robots do not need
+    from rrru.simulation.mujoco_robot import MujocoRobot
+
+    stops = draw.stops
+    with TemporaryDirectory() as folder:
+        file = Path(folder) / draw.robot_file
+        file.write_text(draw.nominal.text("mjcf"))
+        section = draw.nominal.section(str(file), "mjcf")
+        mechanism = make_mechanism("own", section)
+        robot = MujocoRobot(mechanism, file, section["platform"], _causes(draw, cause))
+        machine = robot.machine(stops.payload_kg.max())
+    place, _ = draw.nominal.poses(stops.drive)
+    motion = DriveList(
+        stops.drive,
+        np.arange(len(stops.drive)),
+        stops.payload_kg,
+        stops.time_s,
+        np.zeros_like(stops.drive),
+        place,
+    )
+    return machine.drive(motion, False)
+
+
+def driven(draw):
+    """The Draw with its poses simulated by MuJoCo, with and without its cause.
+
+    Raises SimulationError or UnreachableError where the simulation fails.
+    """
+    causes = {draw.cause is not None, False}
+    return replace(draw, driven={acts: _mujoco_poses(draw, draw.cause if acts else None) for acts in causes})
+
+
+def _causes(draw, cause):
+    """Sizes by site by the name of a cause of MuJoCo's plant."""
+    names = draw.nominal.names
+    generator = stream(draw.seed, "sentences built", draw.name)
+    placed = {
+        site: float((_LENGTH_MM if site[-2] != "r" else _ANGLE_RAD) * generator.standard_normal())
+        for site in draw.nominal.places
+    }
+    causes = {"zero_offset": dict(zip(names, draw.zeros.tolist(), strict=True)), "placement": placed}
+    if cause is not None:
+        sizes = {name: size for name, size in zip(names, cause.sizes, strict=True) if size}
+        if cause.name == "drive_compliance":
+            sizes = {name: 1.0 / size for name, size in sizes.items()}
+        causes[MUJOCO[cause.name]] = sizes
+    return causes

@@ -1,22 +1,101 @@
 """Twenty kinds of own robots with dimensions and masses at random. Lengths mm, angles rad, masses kg."""
 
+from functools import partial
+
 import numpy as np
 
-from rrru.studies.blind_validation.sentences.chains import Chain, Joint
-from rrru.studies.blind_validation.sentences.rods import Rods
+from rrru.studies.blind_validation.sentences.own_robots import Chain, Joint, Rods
 
 _X, _Y, _Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 _AXES = {"x": _X, "y": _Y, "z": _Z}
 
+# rows of joints: letter of the axis, capital for a slide; seat in mm; span; mass in kg
+_ARM = [
+    ("z", (0, 0, 180), (-1.2, 1.2), 11.0),
+    ("y", (60, 0, 220), (-0.7, 0.9), 9.5),
+    ("y", (0, 0, 500), (-0.8, 0.8), 5.0),
+]
+_WRIST = [
+    ("x", (420, 0, 40), (-1.3, 1.3), 3.8),
+    ("y", (40, 0, 0), (-1.3, 1.3), 1.6),
+    ("x", (80, 0, 0), (-1.8, 1.8), 0.4),
+]
+_OFFSET_WRIST = [
+    ("y", (390, 110, 0), (-1.2, 1.2), 2.2),
+    ("z", (0, 90, -40), (-1.3, 1.3), 1.8),
+    ("y", (0, 60, -90), (-1.8, 1.8), 0.5),
+]
+_ARM7 = [
+    ("z", (0, 0, 170), (-1.2, 1.2), 4.0),
+    ("y", (0, 0, 170), (-0.9, 0.9), 4.0),
+    ("z", (0, 0, 200), (-1.2, 1.2), 3.0),
+    ("y", (0, 0, 200), (-1.4, -0.3), 2.7),
+    ("z", (0, 0, 190), (-1.2, 1.2), 1.7),
+    ("y", (0, 0, 190), (-1.2, 1.2), 1.6),
+    ("z", (0, 0, 80), (-1.8, 1.8), 0.4),
+]
+# two vertical axes, and a quill that slides and rotates
+_SCARA = [
+    ("z", (0, 0, 300), (-1.3, 1.3), 9.0),
+    ("z", (330, 0, 60), (0.3, 1.9), 5.0),
+    ("Z", (270, 0, 0), (-150, 0), 1.5),
+    ("z", (0, 0, -120), (-1.8, 1.8), 0.4),
+]
+# a carriage on a column with three vertical axes
+_LIFT_SCARA = [
+    ("Z", (0, 0, 400), (-250, 250), 15.0),
+    ("z", (80, 0, 0), (-1.2, 1.2), 6.0),
+    ("z", (320, 0, 50), (0.3, 1.9), 4.0),
+    ("z", (280, 0, -40), (-1.6, 1.6), 1.0),
+]
+_SLIDES = [
+    ("X", (0, 0, 900), (-400, 400), 30.0),
+    ("Y", (0, 60, 80), (-350, 350), 14.0),
+    ("Z", (90, 0, 0), (-250, 150), 6.0),
+]
+# a head of two axes, as in milling machines
+_HEAD = [("z", (0, 0, -150), (-1.6, 1.6), 3.0), ("y", (0, 40, -90), (-1.0, 1.0), 2.0)]
+# a turret that tilts a ram
+_POLAR = [
+    ("z", (0, 0, 350), (-1.3, 1.3), 12.0),
+    ("y", (40, 0, 120), (-0.6, 0.6), 8.0),
+    ("X", (350, 0, 30), (0, 350), 5.0),
+    ("x", (160, 0, 0), (-1.8, 1.8), 1.0),
+]
+# a rotating column with a carriage and a ram
+_CYLINDRICAL = [
+    ("z", (0, 0, 200), (-1.4, 1.4), 14.0),
+    ("Z", (60, 0, 300), (-200, 250), 9.0),
+    ("X", (250, 0, 0), (0, 350), 5.0),
+    ("z", (150, 0, -60), (-1.8, 1.8), 1.0),
+]
+# rows and tip of each kind of chain, see `_chain`
+_CHAINS = {
+    "arm4": ([*_ARM, ("z", (450, 0, 0), (-1.5, 1.5), 1.5)], (70, 0, -60)),
+    "arm5": ([*_ARM, *_WRIST[1:]], (90, 20, 30)),
+    "arm6": ([*_ARM, *_WRIST], (90, 0, 40)),
+    "arm6_offset": ([*_ARM, *_OFFSET_WRIST], (20, 90, 0)),
+    "arm6_hanging": ([*_ARM, *_WRIST], (100, 0, 0)),
+    "arm7": (_ARM7, (50, 0, 80)),
+    "arm6_on_rail": ([("X", (0, 0, 300), (-600, 600), 40.0), *_ARM, *_WRIST], (90, 0, 40)),
+    "scara": (_SCARA, (60, 30, -50)),
+    "lift_scara": (_LIFT_SCARA, (80, 20, -70)),
+    "gantry3": (_SLIDES, (30, 20, -120)),
+    "gantry4": ([*_SLIDES, ("z", (0, 0, -150), (-1.8, 1.8), 2.0)], (70, 20, -90)),
+    "gantry5": ([*_SLIDES, *_HEAD], (40, 0, -140)),
+    "polar": (_POLAR, (70, 30, 40)),
+    "cylindrical": (_CYLINDRICAL, (60, 20, -60)),
+}
 
-def _chain(generator, rows, tip_mm, hangs=False):
-    """A Chain of rows (letter of the axis, capital for a slide; seat in mm; span; mass) with random variations."""
-    joints, scale = [], generator.uniform(0.75, 1.3)
+
+def _chain(generator, name):
+    """A Chain of a kind, its rows with random variations."""
+    (rows, tip_mm), joints, scale = _CHAINS[name], [], generator.uniform(0.75, 1.3)
     for number, (letter, seat, span, mass) in enumerate(rows, 1):
         unit = "mm" if letter.isupper() else "rad"
         place = scale * np.array(seat) * generator.uniform(0.85, 1.15, 3) + generator.uniform(-8.0, 8.0, 3)
         ends = np.array(span) * (scale if unit == "mm" else 1.0) * generator.uniform(0.9, 1.0)
-        turned = (np.pi, 0.0, 0.0) if hangs and number == 1 else (0.0, 0.0, 0.0)
+        turned = (np.pi, 0.0, 0.0) if name == "arm6_hanging" and number == 1 else (0.0, 0.0, 0.0)
         centre = 60.0 * generator.uniform(-1.0, 1.0, 3)
         joints.append(
             Joint(
@@ -34,132 +113,6 @@ def _chain(generator, rows, tip_mm, hangs=False):
     return Chain(tuple(joints), tuple(tip.tolist()))
 
 
-_ARM = [
-    ("z", (0, 0, 180), (-1.2, 1.2), 11.0),
-    ("y", (60, 0, 220), (-0.7, 0.9), 9.5),
-    ("y", (0, 0, 500), (-0.8, 0.8), 5.0),
-]
-_WRIST = [
-    ("x", (420, 0, 40), (-1.3, 1.3), 3.8),
-    ("y", (40, 0, 0), (-1.3, 1.3), 1.6),
-    ("x", (80, 0, 0), (-1.8, 1.8), 0.4),
-]
-
-
-def _arm4(generator):
-    """Three axes and a wrist that rotates about the vertical."""
-    return _chain(generator, [*_ARM, ("z", (450, 0, 0), (-1.5, 1.5), 1.5)], (70, 0, -60))
-
-
-def _arm5(generator):
-    """An arm without rotation of its forearm."""
-    return _chain(generator, [*_ARM, *_WRIST[1:]], (90, 20, 30))
-
-
-def _arm6(generator):
-    """Six axes with a wrist."""
-    return _chain(generator, [*_ARM, *_WRIST], (90, 0, 40))
-
-
-def _arm6_offset(generator):
-    """Six axes with offsets in the wrist, as in light arms."""
-    wrist = [("y", (390, 110, 0), (-1.2, 1.2), 2.2), ("z", (0, 90, -40), (-1.3, 1.3), 1.8)]
-    return _chain(generator, [*_ARM, *wrist, ("y", (0, 60, -90), (-1.8, 1.8), 0.5)], (20, 90, 0))
-
-
-def _arm6_hanging(generator):
-    """Six axes under a ceiling."""
-    return _chain(generator, [*_ARM, *_WRIST], (100, 0, 0), hangs=True)
-
-
-def _arm7(generator):
-    """Seven axes, alternately along and across the arm."""
-    rows = [
-        ("z", (0, 0, 170), (-1.2, 1.2), 4.0),
-        ("y", (0, 0, 170), (-0.9, 0.9), 4.0),
-        ("z", (0, 0, 200), (-1.2, 1.2), 3.0),
-        ("y", (0, 0, 200), (-1.4, -0.3), 2.7),
-        ("z", (0, 0, 190), (-1.2, 1.2), 1.7),
-        ("y", (0, 0, 190), (-1.2, 1.2), 1.6),
-        ("z", (0, 0, 80), (-1.8, 1.8), 0.4),
-    ]
-    return _chain(generator, rows, (50, 0, 80))
-
-
-def _arm6_on_rail(generator):
-    """Six axes on a rail."""
-    return _chain(generator, [("X", (0, 0, 300), (-600, 600), 40.0), *_ARM, *_WRIST], (90, 0, 40))
-
-
-def _scara(generator):
-    """Two vertical axes, and a quill that slides and rotates."""
-    rows = [
-        ("z", (0, 0, 300), (-1.3, 1.3), 9.0),
-        ("z", (330, 0, 60), (0.3, 1.9), 5.0),
-        ("Z", (270, 0, 0), (-150, 0), 1.5),
-        ("z", (0, 0, -120), (-1.8, 1.8), 0.4),
-    ]
-    return _chain(generator, rows, (60, 30, -50))
-
-
-def _lift_scara(generator):
-    """A carriage on a column with three vertical axes."""
-    rows = [
-        ("Z", (0, 0, 400), (-250, 250), 15.0),
-        ("z", (80, 0, 0), (-1.2, 1.2), 6.0),
-        ("z", (320, 0, 50), (0.3, 1.9), 4.0),
-        ("z", (280, 0, -40), (-1.6, 1.6), 1.0),
-    ]
-    return _chain(generator, rows, (80, 20, -70))
-
-
-def _gantry3(generator):
-    """Three slides."""
-    return _chain(generator, _slides(), (30, 20, -120))
-
-
-def _slides():
-    """Rows of three slides."""
-    return [
-        ("X", (0, 0, 900), (-400, 400), 30.0),
-        ("Y", (0, 60, 80), (-350, 350), 14.0),
-        ("Z", (90, 0, 0), (-250, 150), 6.0),
-    ]
-
-
-def _gantry4(generator):
-    """Three slides and a rotation about the vertical."""
-    return _chain(generator, [*_slides(), ("z", (0, 0, -150), (-1.8, 1.8), 2.0)], (70, 20, -90))
-
-
-def _gantry5(generator):
-    """Three slides and a head of two axes, as in milling machines."""
-    head = [("z", (0, 0, -150), (-1.6, 1.6), 3.0), ("y", (0, 40, -90), (-1.0, 1.0), 2.0)]
-    return _chain(generator, [*_slides(), *head], (40, 0, -140))
-
-
-def _polar(generator):
-    """A turret that tilts a ram."""
-    rows = [
-        ("z", (0, 0, 350), (-1.3, 1.3), 12.0),
-        ("y", (40, 0, 120), (-0.6, 0.6), 8.0),
-        ("X", (350, 0, 30), (0, 350), 5.0),
-        ("x", (160, 0, 0), (-1.8, 1.8), 1.0),
-    ]
-    return _chain(generator, rows, (70, 30, 40))
-
-
-def _cylindrical(generator):
-    """A rotating column with a carriage and a ram."""
-    rows = [
-        ("z", (0, 0, 200), (-1.4, 1.4), 14.0),
-        ("Z", (60, 0, 300), (-200, 250), 9.0),
-        ("X", (250, 0, 0), (0, 350), 5.0),
-        ("z", (150, 0, -60), (-1.8, 1.8), 1.0),
-    ]
-    return _chain(generator, rows, (60, 20, -60))
-
-
 def _circle(radius_mm, degrees, height_mm=0.0):
     """Points (n, 3) of a circle."""
     angle = np.radians(degrees)
@@ -171,11 +124,11 @@ def _pairs(generator, apart):
     return np.repeat([0.0, 120.0, 240.0], 2) + apart * np.tile([-1.0, 1.0], 3) + generator.uniform(-4.0, 4.0, 6)
 
 
-def _hexapod(generator, spread=(250.0, 170.0), uneven=3.0):
-    """Six struts between two rings."""
+def _hexapod(generator, uneven=3.0):
+    """Six struts between two rings with normal errors of a size in mm."""
     low, high = generator.uniform(0.8, 1.3, 2)
-    foot = _circle(spread[0] * low, _pairs(generator, generator.uniform(12.0, 22.0)), 50.0)
-    head = _circle(spread[1] * low, _pairs(generator, generator.uniform(40.0, 48.0)), -20.0)
+    foot = _circle(250.0 * low, _pairs(generator, generator.uniform(12.0, 22.0)), 50.0)
+    head = _circle(170.0 * low, _pairs(generator, generator.uniform(40.0, 48.0)), -20.0)
     foot, head = (points + uneven * generator.standard_normal((6, 3)) for points in (foot, head))
     home = np.array([0.0, 0.0, 470.0 * high])
     return Rods(
@@ -196,11 +149,6 @@ def _symmetric(limit):
 def _masses(generator, masses=(4.0, 1.4, 0.6)):
     """Masses of platform, drive and rod."""
     return tuple((np.array(masses) * generator.uniform(0.7, 1.4, 3)).tolist())
-
-
-def _hexapod_uneven(generator):
-    """Six struts between two strongly irregular rings."""
-    return _hexapod(generator, uneven=15.0)
 
 
 def _hexaglide(generator):
@@ -276,22 +224,9 @@ def _hexa(generator):
 
 
 KINDS = {
-    "arm4": _arm4,
-    "arm5": _arm5,
-    "arm6": _arm6,
-    "arm6_offset": _arm6_offset,
-    "arm6_hanging": _arm6_hanging,
-    "arm7": _arm7,
-    "arm6_on_rail": _arm6_on_rail,
-    "scara": _scara,
-    "lift_scara": _lift_scara,
-    "gantry3": _gantry3,
-    "gantry4": _gantry4,
-    "gantry5": _gantry5,
-    "polar": _polar,
-    "cylindrical": _cylindrical,
+    **{name: partial(_chain, name=name) for name in _CHAINS},
     "hexapod": _hexapod,
-    "hexapod_uneven": _hexapod_uneven,
+    "hexapod_uneven": partial(_hexapod, uneven=15.0),
     "hexaglide": _hexaglide,
     "delta_rails": _delta_rails,
     "delta": _delta,

@@ -6,12 +6,11 @@ from tempfile import TemporaryDirectory
 import numpy as np
 import pandas as pd
 
-from rrru.diagnosis.settings import GapSettings
 from rrru.errors import RrruError, SimulationError, UnreachableError
 from rrru.studies.blind_validation.chunks import MISTAKES, PAGES, RIGHT
 from rrru.studies.blind_validation.sentences import mistakes, page
 from rrru.studies.blind_validation.sentences.claims import UNKNOWN, claims
-from rrru.studies.blind_validation.sentences.draws import draw
+from rrru.studies.blind_validation.sentences.draws import draw, driven
 from rrru.studies.blind_validation.sentences.judge import KINDS, judge
 from rrru.studies.blind_validation.sentences.truth import truth_of
 
@@ -31,7 +30,7 @@ COLUMNS = ["check", "robot", "truth", "statement", "kind", "text", "result"]
 
 
 def statements(check, numbers, settings):
-    """Rows of `withheld_statements` of a check's numbers; settings: gap, margin, seed, stops, mujoco_share."""
+    """Rows of `withheld_statements` of a check's numbers; settings: see `settings_of`."""
     made = {PAGES: _of_page, MISTAKES: _of_mistake, RIGHT: _of_right_file}[check]
     rows = []
     for number in numbers:
@@ -51,7 +50,7 @@ def _of_page(number, settings, folder):
     own.write(folder, rows[np.repeat(~own.stops.fresh, len(own.targets))], "stops.csv")
     section, robot = own.section(folder, "stops.csv"), own.nominal.section(str(folder / own.robot_file), own.kind)
     try:
-        run = page.run(own.name, section, robot, settings)
+        run = page.run(own.name, section, robot, settings["config"])
     except RrruError as error:
         said = [("a right campaign is refused", f"{type(error).__name__}: {error}", False)]
         return own.name, own.in_words, said
@@ -59,7 +58,7 @@ def _of_page(number, settings, folder):
     except Exception as error:
         said = [("a run ends with a traceback", f"{type(error).__name__}: {error}", False)]
         return own.name, own.in_words, said
-    truth = truth_of(own, run, folder, settings["gap"])
+    truth = truth_of(own, run, folder)
     true = f"{own.in_words}; {truth.strength:.3g} times the noise after a calibration"
     return own.name, true, [_judged(claim, truth, run.page.facts) for claim in claims(run.page)]
 
@@ -68,9 +67,6 @@ def _driven(number, settings):
     """The Draw of a number, simulated with NumPy where MuJoCo cannot drive it."""
     own = draw(number, settings["seed"], settings["stops"], settings["mujoco_share"])
     if own.plant == "mujoco":
-        # a large import that most robots do not need
-        from rrru.studies.blind_validation.sentences.driven import driven
-
         try:
             return driven(own)
         except (SimulationError, UnreachableError):
@@ -131,8 +127,6 @@ def _example(part):
 
 
 def settings_of(settings):
-    """The settings of `statements`, from a rule's settings."""
-    section = settings["withheld"]["sentences"]
-    gap = GapSettings.from_config(settings["gap"], settings["seed"])
-    own = {"gap": gap, "margin": settings["calibration"]["singularity_margin"]}
-    return own | {"seed": settings["seed"]} | {key: section[key] for key in ("stops", "mujoco_share")}
+    """The settings of `statements` from a rule's: seed, stops, mujoco_share, and config, see `page.run`."""
+    section, config = settings["withheld"]["sentences"], {key: settings[key] for key in ("seed", "gap", "calibration")}
+    return {"seed": settings["seed"], "config": config} | {key: section[key] for key in ("stops", "mujoco_share")}

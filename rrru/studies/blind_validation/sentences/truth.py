@@ -2,10 +2,15 @@
 
 Sizes are errors of exact positions: those of the plant compared with the calibrated or corrected model of the diagnosis
 at the same stops. These are the stops of the file and fresh ones that no file has. mm, rad, kg.
+
+Robots' files are read again by other code than the package's: a URDF by its tags, an MJCF by MuJoCo. Loops of an MJCF
+are closed by Newton's method on MuJoCo's own constraint Jacobian, at given actuator positions.
 """
 
 from dataclasses import dataclass, field, replace
+from xml.etree import ElementTree
 
+import mujoco
 import numpy as np
 from scipy.spatial.transform import Rotation
 
@@ -15,11 +20,13 @@ from rrru.diagnosis.make_problem import make_case
 from rrru.diagnosis.state import State
 from rrru.studies.blind_validation.sentences import page
 from rrru.studies.blind_validation.sentences.causes import Stops
-from rrru.studies.blind_validation.sentences.files import file_poses, has_play
+from rrru.studies.blind_validation.sentences.own_robots import file_scale
 
 _ALL = "all.csv"
 # distance from which a drive approaches, in mm and rad
 _APPROACH = {"rad": 0.05, "mm": 20.0}
+_MM = 1000.0
+_NEWTON_STEPS, _CLOSED_M = 40, 1e-10
 
 
 @dataclass(frozen=True)
@@ -82,22 +89,22 @@ class Truth:
         return float(np.clip(1.0 - uncertain / self.before_mm**2, 0.0, 1.0))
 
 
-def truth_of(draw, run, folder, gap):
-    """The Truth of a Draw whose Run was made in a folder; gap: the GapSettings."""
+def truth_of(draw, run, folder):
+    """The Truth of a Draw whose Run was made in a folder."""
     inference = run.diagnosis.inference
     case, fresh = inference.case, np.repeat(draw.stops.fresh, len(draw.targets))
     poses, still = draw.poses(), draw.poses(cause=False) if draw.cause else None
     exact = _as_read(draw, run, draw.readings(poses), folder)
-    library = gap.library(case.mechanism)
+    library = run.library(case.mechanism)
     # with the effects as fitted: all readings together could allow more orders of a drive error function
-    whole = make_case(exact, case.mechanism, run.masses, run.noise_mm, library, True, case.arm_mm)
+    whole = make_case(exact, case.mechanism, run.masses, draw.noise_mm, library, True, case.arm_mm)
     whole = replace(whole, library=whole.library | case.library)
     count = len(exact)
     before = whole.left(State(inference.calibrated.deviations, {}))[:count]
     after = whole.standing(inference.state).left(inference.state)[:count]
     free = exact if still is None else _as_read(draw, run, draw.readings(still), folder)
-    geometry, without = _calibrated(free[~fresh], run)
-    _, left = _calibrated(exact[~fresh], run) if still is not None else (None, np.zeros((int((~fresh).sum()), 3)))
+    geometry, without = _calibrated(draw, run, free[~fresh])
+    _, left = _calibrated(draw, run, exact[~fresh]) if still is not None else (None, np.zeros((int((~fresh).sum()), 3)))
     seen, name = before[~fresh], draw.cause.effect if draw.cause else None
     held = name in library
     noise_rms, chosen = float(np.sqrt(3.0) * draw.noise_mm), np.repeat(~draw.stops.fresh, len(draw.targets))
@@ -147,13 +154,13 @@ def _as_read(draw, run, readings, folder):
     draw.write(folder, table.assign(time_s=np.arange(len(table), dtype=float)), _ALL)
     section = draw.section(folder, _ALL)
     exact = page.read(section, draw.nominal.section(str(folder / draw.robot_file), draw.kind)).measurements
-    own, given = run.ingested.measurements, run.ingested.registration
-    seen, vectors = readings
-    exact = exact.assign(**rows.vector_columns("measured", given.apply(seen) if given else seen), status="ok")
+    own, (seen, vectors) = run.measurements, readings
+    seen = seen @ run.rotation.T + run.translation_mm
+    exact = exact.assign(**rows.vector_columns("measured", seen), status="ok")
     exact = exact.assign(time_s=table["time_s"])
     if "measured_rx_rad" in exact:
-        rotation = given.rotation if given else np.eye(3)
-        exact = exact.assign(**rows.turn_columns("measured", rotation @ turned(vectors) @ _seat(draw, own, rotation)))
+        turns = run.rotation @ turned(vectors) @ _seat(draw, own, run.rotation)
+        exact = exact.assign(**rows.turn_columns("measured", turns))
     if "target" in own:
         first = own.drop_duplicates("target").set_index("target")
         columns = [f"target_{axis}_mm" for axis in "xyz"]
@@ -176,10 +183,10 @@ def _seat(draw, own, rotation):
     return Rotation.from_matrix(back).mean().as_matrix()
 
 
-def _calibrated(exact, run):
+def _calibrated(draw, run, exact):
     """Deviations (p,) of a plain calibration of exact readings, and its position residuals (n, 3)."""
     case = run.diagnosis.inference.case
-    own = make_case(exact.reset_index(drop=True), case.mechanism, run.masses, run.noise_mm, {}, True, case.arm_mm)
+    own = make_case(exact.reset_index(drop=True), case.mechanism, run.masses, draw.noise_mm, {}, True, case.arm_mm)
     state = calibrate(own)
     return np.asarray(state.deviations), own.left(state)[: len(exact)]
 
@@ -193,12 +200,12 @@ def _of_files(draw, run, exact, fresh):
     files = {"given": written.with_name(draw.robot_file)}
     if not any(text.startswith("not corrected") for text in run.page.not_in_model):
         files["file"] = written
-    measured, read = rows.measured(exact), rows.measured(run.ingested.measurements)
-    right = (run.ingested.measurements["status"] == "ok").to_numpy()
+    measured, read = rows.measured(exact), rows.measured(run.measurements)
+    right = rows.usable(run.measurements)
     for key, file in files.items():
         loops = draw.kind == "mjcf" and draw.nominal.formats == ("mjcf",)
         joint_effects = {one["name"] for one in run.page.facts["effects"]} & {"drive_compliance", "backlash"}
-        if key == "file" and draw.kind == "mjcf" and joint_effects and (loops or has_play(file)):
+        if key == "file" and draw.kind == "mjcf" and joint_effects and (loops or _has_play(file)):
             continue
         place, turn, sites = file_poses(file, draw, draw.stops.drive, draw.stops.payload_kg)
         points = [sites.get(name, np.array(at)) if key == "file" else np.array(at) for name, at in draw.targets.items()]
@@ -223,3 +230,111 @@ def _of_drives(draw, run):
     place, _ = draw.poses(stops=stops)
     rotation, shift = draw.frame
     return _rms((place @ rotation.T + shift)[1::2] - rows.command(table))
+
+
+# --- robots' files read again
+
+
+def file_poses(file, draw, values, payload_kg):
+    """Positions (n, 3), rotations (n, 3, 3) of the platform of a file at actuator positions (n, K), and its sites.
+
+    Sites: places (3,) on the platform by name. The drives of an MJCF without loops deflect by their servo stiffness.
+    """
+    if draw.kind == "urdf":
+        return (*_urdf_poses(file, values), {})
+    return _mjcf_poses(file, draw, values, payload_kg)
+
+
+def _has_play(file):
+    """Whether an MJCF has joints that model the backlash of others."""
+    model = mujoco.MjModel.from_xml_path(str(file))
+    driven = set(model.actuator_trnid[:, 0].tolist())
+    names = [model.joint(j).name for j in range(model.njnt) if j not in driven]
+    return any(name.endswith("play") or " play" in name for name in names)
+
+
+def _urdf_poses(file, values):
+    """Positions and rotations of the link `tool` of a URDF at drive values of q1, q2, .."""
+    joints = {joint.find("child").get("link"): joint for joint in ElementTree.parse(file).getroot().iter("joint")}
+    way, link = [], "tool"
+    while link in joints and link != "base":
+        way.insert(0, joints[link])
+        link = joints[link].find("parent").get("link")
+    place, turn = np.zeros((len(values), 3)), np.tile(np.eye(3), (len(values), 1, 1))
+    for joint in way:
+        origin, kind = joint.find("origin"), joint.get("type")
+        shift = _numbers(origin, "xyz")
+        place = place + _MM * turn @ shift
+        turn = turn @ Rotation.from_euler("xyz", _numbers(origin, "rpy")).as_matrix()
+        if kind == "fixed":
+            continue
+        axis = _numbers(joint.find("axis"), "xyz", "1 0 0")
+        value = values[:, int(joint.get("name").removeprefix("q")) - 1]
+        along = np.outer(value, axis / np.linalg.norm(axis))
+        if kind == "prismatic":
+            place = place + (turn @ along[:, :, None])[:, :, 0]
+        else:
+            turn = turn @ Rotation.from_rotvec(along).as_matrix()
+    return place, turn
+
+
+def _numbers(tag, key, default="0 0 0"):
+    """Numbers (3,) of an attribute of a tag that may be missing."""
+    return np.array((default if tag is None else tag.get(key, default)).split(), dtype=float)
+
+
+def _mjcf_poses(file, draw, values, payload_kg):
+    """Positions and rotations of the platform of an MJCF at drive values, and its sites."""
+    model = mujoco.MjModel.from_xml_path(str(file))
+    data = mujoco.MjData(model)
+    if model.nkey:
+        mujoco.mj_resetDataKeyframe(model, data, 0)
+    names = draw.nominal.names
+    body = model.body("tool" if "tool" in [model.body(k).name for k in range(model.nbody)] else "plate").id
+    scale = np.array([file_scale(unit) for unit in draw.nominal.units])
+    joints = [model.joint(name) for name in names]
+    address, dof = ([int(getattr(one, key)[0]) for one in joints] for key in ("qposadr", "dofadr"))
+    zero, start = model.qpos0[address], data.qpos.copy()
+    stiff = np.array([model.actuator_gainprm[_servo(model, one.id), 0] for one in joints])
+    places, turns = [], []
+    loops = bool(((model.eq_type == mujoco.mjtEq.mjEQ_CONNECT) | (model.eq_type == mujoco.mjtEq.mjEQ_WELD)).any())
+    own_kg = float(model.body_mass[body])
+    for row, load in zip(values, payload_kg, strict=True):
+        data.qpos[:], data.qvel[:] = start, 0.0
+        data.qpos[address] = zero + scale * row
+        if loops:
+            _close(model, data, dof)
+        elif np.isfinite(stiff).all():
+            model.body_mass[body] = own_kg + load
+            mujoco.mj_forward(model, data)
+            data.qpos[address] -= data.qfrc_bias[dof] / stiff
+        mujoco.mj_kinematics(model, data)
+        places.append(_MM * data.xpos[body])
+        turns.append(data.xmat[body].reshape(3, 3).copy())
+    model.body_mass[body] = own_kg
+    sites = {
+        model.site(k).name: _MM * model.site_pos[k] for k in range(model.nsite) if int(model.site_bodyid[k]) == body
+    }
+    return np.array(places), np.array(turns), sites
+
+
+def _servo(model, joint):
+    """Number of the actuator of a joint."""
+    return int(np.flatnonzero(model.actuator_trnid[:, 0] == joint)[0])
+
+
+def _close(model, data, driven):
+    """Close the loops at the actuator positions; NaN in qpos where Newton's method does not converge."""
+    free = np.setdiff1d(np.arange(model.nv), driven)
+    for _ in range(_NEWTON_STEPS):
+        mujoco.mj_fwdPosition(model, data)
+        count = data.ne
+        off = data.efc_pos[:count]
+        if np.abs(off).max() < _CLOSED_M:
+            return
+        jacobian = data.efc_J.reshape(-1, model.nv)[:count]
+        step = np.zeros(model.nv)
+        step[free] = -np.linalg.lstsq(jacobian[:, free], off, rcond=None)[0]
+        step *= min(1.0, 0.3 / max(np.abs(step).max(), 1e-30))
+        mujoco.mj_integratePos(model, data.qpos, step, 1.0)
+    data.qpos[:] = np.nan

@@ -13,13 +13,13 @@ from scipy.stats import multivariate_normal
 from rrru.diagnosis.diagnose import MeasuredRobot
 from rrru.diagnosis.settings import GapSettings
 from rrru.diagnosis.terms import EffectTerm
-from rrru.studies.blind_validation import draw, rivals
-from rrru.studies.blind_validation.beliefs import beliefs
+from rrru.studies.blind_validation import rivals
 from rrru.studies.blind_validation.chunks import chunks, rivalled
-from rrru.studies.blind_validation.methods import compare
+from rrru.studies.blind_validation.rivals import beliefs
+from rrru.studies.blind_validation.summary import compare_methods
 from rrru.studies.blind_validation.verdicts import in_order
 from tests.schemas import check
-from tests.studies.blind_validation.conditions import CONDITIONS, bare
+from tests.studies.blind_validation.conditions import CONDITIONS, acting, bare
 
 _SETTINGS = GapSettings(("backlash", "axis_tilt", "thermal_growth"), draws=20)
 
@@ -32,8 +32,7 @@ def _known(name="robot"):
 def faulty():
     """A robot with backlash of six times the noise, and its measurements."""
     robot = bare(7)
-    acting = draw.draw_acting(robot, "backlash", False, (6.0, 6.001), np.random.default_rng(3), CONDITIONS)
-    robot = replace(robot, acting=(acting,))
+    robot = replace(robot, acting=(acting(robot, "backlash", span=(6.0, 6.001), seed=3),))
     return robot, robot.measured(CONDITIONS)
 
 
@@ -148,7 +147,7 @@ def test_answers_are_scored_against_the_truth():
         _row("diagnosis", "c", "backlash", {"backlash": 1.0}, 0.1, 3.0),
         _row("gaussian_process", "a", "", {}, 0.4),
     ]
-    table = check("withheld_methods", compare(pd.DataFrame(said), answers)).set_index("method")
+    table = check("withheld_methods", compare_methods(pd.DataFrame(said), answers)).set_index("method")
     own = table.loc["diagnosis"]
     assert own["robots"] == 3 and own["seconds"] == 2.0
     np.testing.assert_allclose(own["right"], 2.0 / 3.0)
