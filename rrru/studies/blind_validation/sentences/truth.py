@@ -23,6 +23,7 @@ from rrru.studies.blind_validation.sentences.causes import Stops
 from rrru.studies.blind_validation.sentences.own_robots import file_scale
 
 _ALL = "all.csv"
+_DIGIT_MM = 1e-5
 # distance from which a drive approaches, in mm and rad
 _APPROACH = {"rad": 0.05, "mm": 20.0}
 _MM = 1000.0
@@ -149,7 +150,9 @@ def _measured_again(stops):
 
 def _as_read(draw, run, readings, folder):
     """Exact readings of all stops as a measurement table, with the frame and the target places of the file's own."""
-    table = draw.table(readings, False)
+    # a reader takes no reading twice in every digit, as of a stop that is measured again: the file has other last digits
+    digits = _DIGIT_MM * np.random.default_rng(0).standard_normal(np.shape(readings[0]))
+    table = draw.table((readings[0] + digits, readings[1]), False)
     # fresh stops are between the others in time, and behind them in the file
     draw.write(folder, table.assign(time_s=np.arange(len(table), dtype=float)), _ALL)
     section = draw.section(folder, _ALL)
