@@ -5,10 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 
+from rrru.campaign.driven_path import follows_path
 from rrru.campaign.ingest.checks import path_length
 from rrru.campaign.ingest.geometry import frame_limit
 from rrru.campaign.ingest.mounting import Mounting
-from rrru.campaign.ingest.outliers import flag_outliers, frequent_jumps, reproduced
+from rrru.campaign.ingest.outliers import far_from_all, flag_outliers, frequent_jumps, reproduced
 from rrru.campaign.ingest.registration import Registration, register
 from rrru.campaign.ingest.sheet import MEASURED, Sheet
 from rrru.campaign.measurements import command, measured, series, vector_columns
@@ -71,6 +72,8 @@ def outliers(frame: pd.DataFrame, digit_mm: float) -> np.ndarray:
     target, run = command(frame), series(frame)
     deviation = measured(frame) - target
     marked = flag_outliers(deviation, run, noise_mm=digit_mm, place=path_length(target))
+    if not follows_path(target, run):
+        marked &= far_from_all(deviation, run)
     return marked & ~reproduced(marked, deviation, target, run)
 
 

@@ -65,6 +65,22 @@ def frequent_jumps(deviation_mm, run, noise_mm=None, threshold=6.0):
     return result
 
 
+def far_from_all(deviation_mm, run, threshold=6.0):
+    """Points (n,) that are many scales of their whole run off its median, for runs whose points follow no path.
+
+    There the robot's errors differ from one point to the next as much as among all of them. Arguments as of
+    `flag_outliers`.
+    """
+    deviation, run = np.asarray(deviation_mm, dtype=float), np.asarray(run)
+    result = np.zeros(len(deviation), dtype=bool)
+    known = np.isfinite(deviation).all(axis=1)
+    for number in np.unique(run[known]):
+        rows = np.flatnonzero(known & (run == number))
+        off = np.linalg.norm(deviation[rows] - np.median(deviation[rows], axis=0), axis=1)
+        result[rows] = off > threshold * robust_sd(off, MEDIAN_OF_LENGTH, _SPIKE_MM)
+    return result
+
+
 def reproduced(marked, deviation_mm, command_mm, run, tolerance_mm=0.6):
     """Which marked points (n,) another run came back to: the robot repeats a spike near a singularity, a beam does not.
 

@@ -6,6 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from rrru.campaign.ingest.in_robot_frame import outliers
 from rrru.campaign.ingest.outliers import flag_outliers, frequent_jumps, reproduced
 from tests.places import DATA
 
@@ -183,3 +184,19 @@ def test_a_spike_that_comes_back_in_another_run_is_the_robots():
     marked = flag_outliers(deviation, run)
     assert np.flatnonzero(marked).tolist() == [10, COUNT + 10, COUNT + 20]
     assert np.flatnonzero(marked & ~reproduced(marked, deviation, command, run)).tolist() == [COUNT + 20]
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_of_stops_in_no_order_only_what_is_far_from_all_is_marked(seed):
+    """The robot's errors grow e-fold from corner to corner, in no order of the stops; a broken beam stands out."""
+    rng = np.random.default_rng(seed)
+    command = rng.uniform(-1.0, 1.0, (150, 3))
+    grows = np.exp(command.sum(axis=1, keepdims=True) / 6.0)
+    deviation = noisy(rng, grows * (1.0 + command @ rng.normal(size=(3, 3))))
+    bad = int(rng.integers(10, 140))
+    deviation[bad] += bad_block(rng, 1, 60.0)[0]
+    columns = {"trajectory": "stops", "run": 1.0}
+    for name, values in (("command", 300.0 * command), ("measured", 300.0 * command + deviation)):
+        columns |= {f"{name}_{axis}_mm": values[:, k] for k, axis in enumerate("xyz")}
+    marked = outliers(pd.DataFrame(columns), 0.001)
+    assert marked[bad] and marked.sum() == 1

@@ -150,7 +150,7 @@ def _measured_again(stops):
 
 def _as_read(draw, run, readings, folder):
     """Exact readings of all stops as a measurement table, with the frame and the target places of the file's own."""
-    # a reader takes no reading twice in every digit, as of a stop that is measured again: the file has other last digits
+    # a reader refuses readings that are alike in every digit, as exact ones of one stop are: other last digits
     digits = _DIGIT_MM * np.random.default_rng(0).standard_normal(np.shape(readings[0]))
     table = draw.table((readings[0] + digits, readings[1]), False)
     # fresh stops are between the others in time, and behind them in the file
