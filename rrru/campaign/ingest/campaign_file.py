@@ -21,7 +21,7 @@ from rrru.campaign.ingest.in_robot_frame import at_tool, jumps, outliers, regist
 from rrru.campaign.ingest.mounting import Mounting, check_turned, mounting, places_instead
 from rrru.campaign.ingest.problems import Problems
 from rrru.campaign.ingest.registration import Registration
-from rrru.campaign.ingest.sent import check_end_effectors, sent_to
+from rrru.campaign.ingest.sent import check_end_effectors, with_sent
 from rrru.campaign.ingest.sheet import COMMAND, MEASURED, NOISE, TARGET, TURNS, Sheet
 from rrru.campaign.ingest.spec import MM, IngestSpec
 from rrru.campaign.measurements import command, measured, turn_columns, turns, vector_columns
@@ -110,9 +110,8 @@ def _read(spec: IngestSpec, mechanism: Robot) -> tuple[Sheet, list[str]]:
         notes += _refuse_gross_error(sheet, any(found[name] in cells.factors for name in MEASURED))
     if not set(COMMAND) <= set(frame):
         problems.refuse()
-        frame = frame.assign(**vector_columns("command", sent_to(frame, mechanism, problems)))
-        which = f"{drives[0]} to {drives[-1]} ({mechanism.name}, nominal)"
-        notes.append(f"no commanded positions: computed from {which}")
+        frame, said = with_sent(frame, mechanism, problems)
+        notes += said
     else:
         check_end_effectors(frame, mechanism, problems)
     frame, more = number_runs(frame, spec.motion is not None and spec.motion.stops)

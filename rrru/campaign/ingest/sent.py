@@ -3,28 +3,41 @@
 import numpy as np
 
 from rrru.campaign.ingest.sheet import COMMAND, position_text
+from rrru.campaign.measurements import vector_columns
 
+# with more rows without a pose something is wrong with all of them
+_MOST_LOST = 0.1
 # the same end effector's position within rounding
 _SAME_MM = 1e-6
 
 
-def sent_to(frame, mechanism, problems):
-    """Positions (n, 3) of the nominal robot at a file's drive values, NaN where one is noted.
+def with_sent(frame, mechanism, problems):
+    """The frame with the nominal robot's positions at its drive values as commanded ones, and notes on them.
 
-    frame: columns of the file under our names, in mm and rad. Raises IngestError where a row does not name the end
-    effector that was measured, for a robot with several.
+    frame: columns of the file under our names, in mm and rad. A few rows at whose values the nominal robot has no pose
+    are left out; more are noted in problems. Raises IngestError where a row does not name the end effector that was
+    measured, for a robot with several.
     """
     drives = [*mechanism.parts.columns]
     check_end_effectors(frame, mechanism, problems)
     problems.refuse()
     values = frame[drives].to_numpy(dtype=float)
     position = mechanism.forward(values, guess_mm=mechanism.guess(values, frame.get("target")))
+    notes = [f"no commanded positions: computed from {drives[0]} to {drives[-1]} ({mechanism.name}, nominal)"]
+    frame = frame.assign(**vector_columns("command", position))
     # blank drive values are a problem of their own
-    for i in np.flatnonzero(np.isnan(position).any(axis=1) & np.isfinite(values).all(axis=1)):
-        value = ", ".join(f"{one:.6g}" for one in frame[drives].iloc[i])
-        allowed = "values at which the nominal robot closes near its home pose, or commanded positions besides them"
-        problems.add("no pose", row=frame.index[i], column=", ".join(drives), value=value, allowed=allowed)
-    return position
+    lost = np.isnan(position).any(axis=1) & np.isfinite(values).all(axis=1)
+    if lost.mean() > _MOST_LOST:
+        for i in np.flatnonzero(lost):
+            value = ", ".join(f"{one:.6g}" for one in values[i])
+            allowed = "values at which the nominal robot closes near its home pose, or commanded positions besides them"
+            problems.add("no pose", row=frame.index[i], column=", ".join(drives), value=value, allowed=allowed)
+    elif lost.any():
+        listed = ", ".join(f"row {row}" for row in frame.index[lost][:10]) + (", ..." if lost.sum() > 10 else "")
+        why = "the nominal robot has no pose near its home pose at their drive values"
+        notes.append(f"left out, since {why}: {lost.sum()} of {len(frame)} rows, {listed}")
+        frame = frame[~lost]
+    return frame, notes
 
 
 def check_end_effectors(frame, mechanism, problems):

@@ -288,14 +288,20 @@ def test_what_is_no_pose_is_refused(arm, driven, tmp_path, change, options, text
         _taken(tmp_path, change(_file(arm, driven)), arm, **options)
 
 
-def test_joints_that_no_robot_can_take_are_refused(tmp_path):
+@pytest.mark.parametrize("wrong", [1, 8])
+def test_joints_that_no_robot_can_take_are_left_out_where_they_are_few(tmp_path, wrong):
     robot = Rrru3()
     point = np.random.default_rng(1).uniform((-300.0, -300.0, 500.0), (300.0, 300.0, 800.0), (30, 3))
     joints = dict(zip(robot.parts.columns, robot.inverse(point).T, strict=True))
-    joints["theta1_rad"][7] += 1.6
+    joints["theta1_rad"][7 : 7 + wrong] += 1.6
     table = pd.DataFrame({"trajectory": "a", **joints, **rows.vector_columns("measured", point)})
-    with pytest.raises(IngestError, match=r"row 9.*closes near its home pose"):
-        _taken(tmp_path, table, robot)
+    if wrong == 1:
+        taken = _taken(tmp_path, table, robot)
+        assert len(taken.measurements) == 29
+        assert any("left out" in note and note.endswith("1 of 30 rows, row 9") for note in taken.notes)
+    else:
+        with pytest.raises(IngestError, match="no pose in more than a tenth of the rows"):
+            _taken(tmp_path, table, robot)
 
 
 def test_candidates_of_reflectors_are_shifts_of_the_platforms_frame(arm):

@@ -236,7 +236,7 @@ _NEVER = {
     *("these data cannot rule out", "next, nothing would settle it", "the fit did not converge"),
     *("runs are limited", "causes by share", "no cause is sure"),
     *("an effect is not tested", "the file is not corrected", "how the file was driven", "a part of a sentence"),
-    *("a reflector is assumed", "jumps are frequent", "masses are unknown"),
+    *("a reflector is assumed", "jumps are frequent", "rows without a pose", "masses are unknown"),
     *("the effects are confounded", "a zero is confounded", "a zero is not determined", "a weight is confounded"),
     *(f"interval of a share: {kind}" for kind in ("covariance", "sampling", "calibration")),
 }

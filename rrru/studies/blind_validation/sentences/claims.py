@@ -122,6 +122,7 @@ _READ = {
     "far from ordinary errors": rf"the nominal robot has an error of {_X} mm rms, {_Y} % of the robot's size of .*",
     "points are outliers": r"(?P<count>\d+) points? marked as outliers?, .*",
     "jumps are frequent": r"at least (?P<count>\d+) points jump off their neighbours, .*",
+    "rows without a pose": r"left out, since the nominal robot has no pose .*",
     "stale readings": r"(?P<count>\d+) stale readings, .*",
     "undeclared columns": r"undeclared columns left out: (?P<names>.*)",
     "beyond a range": r"(?P<count>\d+) of (?P<rows>\d+) points are outside of the range of .*",

@@ -495,6 +495,7 @@ _JUDGES = {
     "far from ordinary errors": _outliers,
     "points are outliers": _outliers,
     "jumps are frequent": _undecided,
+    "rows without a pose": _undecided,
     "stale readings": _outliers,
     "undeclared columns": _outliers,
     "beyond a range": _outliers,
