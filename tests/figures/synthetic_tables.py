@@ -280,7 +280,17 @@ def twin_search():
     rows = [(0, 24, 120.0), (0, 600, 95.0), (1, 324, 130.0), (1, 900, 94.8), (2, 324, 110.0), (2, 700, 94.9)]
     progress = pd.DataFrame([*rows, (3, 324, 1e6), (3, 400, 99.0)], columns=["restart", "evaluations", "objective_nat"])
     restarts = progress.groupby("restart", as_index=False).last().assign(stopped="stalled", ended="agreed")
-    return {"twin_progress": check("twin_progress", progress), "twin_restarts": check("twin_restarts", restarts)}
+    tradeoff = pd.DataFrame(
+        [
+            (item, weight, other, 0.6 + 0.02 * weight if other == item else 1.0 - 0.03 * weight, 2.0, other == partner)
+            for item, partner in (("group1_after_min", "lines_after_min"), ("lines_after_max", "order_links"))
+            for weight in (1.0, 4.0, 16.0)
+            for other in (item, partner)
+        ],
+        columns=["item", "weight", "other", "ratio", "contribution_nat", "partner"],
+    )
+    frames = {"twin_progress": progress, "twin_restarts": restarts, "twin_tradeoff": tradeoff}
+    return {name: check(name, frame) for name, frame in frames.items()}
 
 
 def all_tables(ground=None, **choices):

@@ -74,6 +74,18 @@ medians_met            int    of 17 medians over these draws: within 15 % of the
 inside                 int    of 17 printed numbers: within the middle 90 % of these draws
 orders_met             int    of 10 orders: hold in more than half of these draws
 
+## twin_tradeoff | tables/twin_tradeoff.parquet | item weight other
+The search again, with one missed printed number weighing more: what it costs the others; `snakemake --cores 2
+twin_tradeoff`.
+--
+item                   str    printed number that the twin misses
+weight                 float  factor of its contribution to the objective of this search
+other                  str    any printed number or order
+ratio                  float  its median over draws that no search has used, as a share of the printed number; of an
+    order its margin
+contribution_nat       float  its contribution to the objective on these draws, without the factor
+partner                bool   the other number that suffers most from the greatest weight
+
 ## redraws | tables/redraws.parquet | draw item
 The paper's numbers and orders on the same robot for other draws of non-repeatability and noise than in the twin's
 search.

@@ -20,9 +20,13 @@ from rrru.studies.rrru3.paper import ERRORS_MM, printed_half_mm
 _LEAST_SCATTER = 1e-6
 
 
-def misfit(found, orders):
-    """Objective in nat of a candidate; found, orders: numbers in mm and margins (d,) by name over its draws."""
-    return float(sum(surprises(found, orders).values()))
+def misfit(found, orders, weights=None):
+    """Objective in nat of a candidate; found, orders: numbers in mm and margins (d,) by name over its draws.
+
+    weights: factors of single contributions by name, 1 for the others.
+    """
+    parts = surprises(found, orders)
+    return float(sum((weights or {}).get(name, 1.0) * part for name, part in parts.items()))
 
 
 def surprises(found, orders):

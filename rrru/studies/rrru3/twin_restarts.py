@@ -174,8 +174,20 @@ def _ended(restarts, section, hours):
 
 def _key(task, section, start):
     """Digest of all that a restart depends on; the search may be continued with more hours and more restarts."""
-    same = {name: value for name, value in section.items() if name not in ("hours", "restarts", "hypotheses")}
-    names = ("motion", "trajectories", "noise_mm", "line_calibration", "of_model", "registered", "more", "spikes")
+    same = {
+        name: value for name, value in section.items() if name not in ("hours", "restarts", "hypotheses", "tradeoff")
+    }
+    names = (
+        "motion",
+        "trajectories",
+        "noise_mm",
+        "line_calibration",
+        "of_model",
+        "registered",
+        "more",
+        "spikes",
+        "weights",
+    )
     parts = [same, [getattr(task, name) for name in names], task.bounds, start and start.values]
     digest = hashlib.sha256(json.dumps(parts, sort_keys=True).encode())
     for drawn in task.draws:

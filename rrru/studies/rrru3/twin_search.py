@@ -75,7 +75,7 @@ class Task:
     of_model: the errors after a calibration are those of the measured points against the calibrated model, not of a
     robot that is driven again; registered: the tracker's frame is fitted to the commanded points; more: additional
     effects that are searched, or "spikes", see `twin.search_bounds`; spikes: whether the orders of Fig. 9's spikes
-    count. Raises ConfigError for another line calibration.
+    count; weights: see `twin_objective.misfit`. Raises ConfigError for another line calibration.
     """
 
     mechanism: Rrru3
@@ -88,6 +88,7 @@ class Task:
     registered: bool = False
     more: tuple = ()
     spikes: bool = False
+    weights: dict | None = None
 
     def __post_init__(self):
         if self.line_calibration not in LINE_CALIBRATIONS:
@@ -240,7 +241,7 @@ def cost(values, task):
     """Misfit in nat of searched values, in the order of the task's bounds; a large number where it cannot be driven."""
     twin = Twin(dict(zip(task.bounds, np.asarray(values).tolist(), strict=True)))
     try:
-        value = misfit(*simulate(task, twin))
+        value = misfit(*simulate(task, twin), task.weights)
     except (UnreachableError, FitError, np.linalg.LinAlgError):
         return WORST
     return value if np.isfinite(value) else WORST

@@ -20,6 +20,8 @@ PAPER_A_FIGURES = {
     "fig12": (f"{_PAPER_A}.lines:fig12", ["measurements", "errors", "redraw_errors"]),
 }
 TWIN_FIGURES = {"twin_search": (f"{_PAPER_A}.twin:twin_search", ["twin_progress", "twin_restarts"])}
+TRADEOFF_FIGURES = {"twin_tradeoff": (f"{_PAPER_A}.twin:twin_tradeoff", ["twin_tradeoff"])}
+FIGURES |= {"twin": TWIN_FIGURES, "tradeoff": TRADEOFF_FIGURES}
 PAPERS["A"] = {
     "study": "rrru.studies.rrru3",
     "tables": ["errors", "calibrations", "parameters", "genetic", "genetic_parameters", "sweep_runs", "redraw_counts"],
@@ -152,25 +154,30 @@ rule twin_hypotheses:
         "../../scripts/twin_hypotheses.py"
 
 
-rule twin_figures:
-    input:
-        **named(shown(TWIN_FIGURES)),
+rule twin_tradeoff:
     output:
-        **drawn(TWIN_FIGURES),
+        **named(["twin_tradeoff"]),
     log:
-        f"{RESULTS}/logs/figures/twin.log",
+        f"{RESULTS}/logs/twin_tradeoff.log",
+    threads: 2
     params:
-        settings={"figures": TWIN_FIGURES, "options": {}},
-        code=code("figure", TWIN_FIGURES),
+        settings={
+            "nominal": parts.nominal(config, REPRODUCED),
+            "virtual": parts.virtual(config, REPRODUCED),
+            "workers": 2,
+            "state": f"{RESULTS}/twin/tradeoff",
+            **reads("reproduce.line_calibration", "twin"),
+        },
+        code=code("twin_tradeoff"),
     script:
-        "../../scripts/figure.py"
+        "../../scripts/twin_tradeoff.py"
 
 
 # the search and its figure; not part of the default run
 rule twin:
     input:
         rules.twin_search.output,
-        rules.twin_figures.output,
+        drawn(TWIN_FIGURES).values(),
 
 
 rule paper_a_figures:

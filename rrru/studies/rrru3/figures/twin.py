@@ -1,6 +1,6 @@
 """Progress of the search for the twin."""
 
-from rrru.figures import style
+from rrru.figures import choose, style
 
 
 @style.printed
@@ -9,7 +9,7 @@ def twin_search(tables, _options):
     the log probability of what the paper prints. Dots: where a restart ended; the three best are blue.
     """
     progress, restarts = tables["twin_progress"], tables["twin_restarts"]
-    figure = style.new(style.SINGLE_MM, 70.0)
+    figure = style.new(style.DOUBLE_MM, 80.0)
     axes = figure.subplots()
     nearest = restarts.nsmallest(_BEST, "objective_nat")["restart"].tolist()
     # candidates that cannot be driven have a large objective
@@ -24,8 +24,48 @@ def twin_search(tables, _options):
     axes.set_title(f"search ended: {reason[restarts['ended'].iloc[0]]}")
     axes.set(xlabel="evaluations of a restart", ylabel="objective (nat)", xlim=(0.0, None))
     axes.grid(True)
-    style.legend_above(figure, [axes], columns=2)
+    style.legend_above(figure, [axes], columns=3)
     return figure
 
 
-_BEST, _HIGHEST = 3, 1.5
+@style.printed
+def twin_tradeoff(tables, _options):
+    """Printed numbers that the twin misses against the number that suffers most where they weigh more in the search:
+    medians over draws as shares of what is printed, a point for every weight. Grey: within 15 % of both.
+    """
+    table = tables["twin_tradeoff"]
+    items = table.loc[table["partner"], "item"].unique()
+    if not len(items):
+        return style.note("the twin misses no printed number")
+    columns = min(_COLUMNS, len(items))
+    rows = -(-len(items) // columns)
+    figure = style.new(style.DOUBLE_MM, 12.0 + 58.0 * rows)
+    grid = figure.subplots(rows, columns, squeeze=False).ravel()
+    for axes, item in zip(grid, items, strict=False):
+        _tradeoff(axes, table[table["item"] == item])
+    for axes in grid[len(items) :]:
+        axes.set_axis_off()
+    return figure
+
+
+def _tradeoff(axes, rows):
+    """The curve of one missed number and its partner."""
+    item, partner = rows["item"].iloc[0], rows.loc[rows["partner"], "other"].iloc[0]
+    own, other = (rows[rows["other"] == name].sort_values("weight") for name in (item, partner))
+    axes.plot(own["ratio"], other["ratio"], "o-", color=style.BLUE, markersize=3.5, linewidth=0.8)
+    for weight, x, y in zip(own["weight"], own["ratio"], other["ratio"], strict=True):
+        axes.annotate(f"x {weight:g}", (x, y), textcoords="offset points", xytext=(4, 4), fontsize=7.0)
+    box = {"facecolor": "#eeeeee", "edgecolor": "none", "zorder": 0}
+    axes.axvspan(1.0 - TOLERANCE, 1.0 + TOLERANCE, **box)
+    if not partner.startswith("order_"):
+        axes.axhspan(1.0 - TOLERANCE, 1.0 + TOLERANCE, **box)
+    axes.set(xlabel=f"{choose.plain(item)}\n(share of printed)", ylabel=f"{choose.plain(partner)}\n(share of printed)")
+    if partner.startswith("order_"):
+        axes.set_ylabel(f"{choose.plain(partner)}\n(margin)")
+    axes.margins(0.15)
+    axes.grid(True)
+
+
+_BEST, _HIGHEST, _COLUMNS = 3, 1.5, 3
+# of a matched number, as in `study_numbers`
+TOLERANCE = 0.15
