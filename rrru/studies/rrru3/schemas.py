@@ -68,7 +68,8 @@ statement              str    what it says
 searched               int    searched numbers
 evaluations
 objective_nat          float? least objective of its search; null where no candidate can be driven
-fresh_nat              float? objective of that candidate on draws that no search has used, all orders included
+fresh_nat              float? objective of that candidate on draws that no search has used, all orders included; null
+    where it cannot be driven
 gain_nat               float? how much less that is than for the first hypothesis: log of a probability ratio
 medians_met            int    of 17 medians over these draws: within 15 % of the printed number
 inside                 int    of 17 printed numbers: within the middle 90 % of these draws

@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from rrru.errors import UnreachableError
 from rrru.studies.rrru3 import study_numbers as numbers
 from rrru.studies.rrru3 import twin_restarts, twin_search
 from rrru.studies.rrru3.paper import ERRORS_MM
@@ -58,12 +57,11 @@ def compare(task, fresh, section, start=None, workers=1, folder=None):
 
 def judged(task, restart):
     """Objectives and counts of a restart's best candidate on the task's draws; nulls where it cannot be driven."""
-    if restart.genes is None:
-        return {"objective_nat": np.nan, "fresh_nat": np.nan} | dict.fromkeys(_COUNTS, 0)
+    objective = restart.best if restart.best < twin_search.WORST else np.nan
     try:
         found, orders = twin_search.simulate(task, restart.twin)
-    except UnreachableError:
-        return {"objective_nat": restart.best, "fresh_nat": np.nan} | dict.fromkeys(_COUNTS, 0)
+    except twin_search.NOT_DRIVEN:
+        return {"objective_nat": objective, "fresh_nat": np.nan} | dict.fromkeys(_COUNTS, 0)
     low, high = ({item: np.quantile(values, share) for item, values in found.items()} for share in QUANTILES)
     printed = ERRORS_MM.items()
     counts = (
@@ -71,5 +69,5 @@ def judged(task, restart):
         sum(bool(low[item] <= value <= high[item]) for item, value in printed),
         sum(bool(np.median(margin) > 0.0) for margin in orders.values()),
     )
-    values = {"objective_nat": restart.best, "fresh_nat": misfit(found, orders)}
+    values = {"objective_nat": objective, "fresh_nat": misfit(found, orders)}
     return values | dict(zip(_COUNTS, counts, strict=True))

@@ -20,7 +20,7 @@ from rrru.genetic.cma_es import Distribution
 from rrru.seeds import stream
 from rrru.store import json_files
 from rrru.studies.rrru3.twin import PERIODIC, Twin
-from rrru.studies.rrru3.twin_search import WORST, cost
+from rrru.studies.rrru3.twin_search import cost
 
 # restarts that have to agree, and within which share of the objective
 AGREEING, AGREEMENT = 3, 0.01
@@ -38,7 +38,7 @@ class Restart:
         self.low, self.high = np.array(list(task.bounds.values())).T
         self.periodic = np.isin(list(task.bounds), PERIODIC)
         self.generator = stream(section["seed"], "twin", number)
-        self.evaluations, self.best, self.genes, self.history, self.stopped = 0, WORST, None, [], ""
+        self.evaluations, self.best, self.genes, self.history, self.stopped = 0, np.inf, None, [], ""
         self.distribution = None
         if start is not None:
             values = [start.values.get(name, 0.0) for name in task.bounds]
@@ -143,7 +143,7 @@ def search(task, section, start=None, workers=1, path=None, limit=None):
 
 def best(restarts):
     """The restart with the least objective."""
-    return min((one for one in restarts if one.genes is not None), key=lambda restart: restart.best)
+    return min(restarts, key=lambda restart: restart.best)
 
 
 def tables(restarts, ended):

@@ -33,6 +33,7 @@ SPIRAL_MARGIN = 0.1
 # ASSUME the paper does not say which lines Table 5 was fitted on: "group_1" (26 points) or "lines" (all seven groups)
 LINE_CALIBRATIONS = ("group_1", "lines")
 WORST = 1e6
+NOT_DRIVEN = (UnreachableError, FitError, np.linalg.LinAlgError)
 # of the random streams of a campaign that is measured, calibrated and driven again
 _LABELS = ("measure", "closed_loop")
 _line_run = cache(make_run)
@@ -242,6 +243,6 @@ def cost(values, task):
     twin = Twin(dict(zip(task.bounds, np.asarray(values).tolist(), strict=True)))
     try:
         value = misfit(*simulate(task, twin), task.weights)
-    except (UnreachableError, FitError, np.linalg.LinAlgError):
+    except NOT_DRIVEN:
         return WORST
     return value if np.isfinite(value) else WORST

@@ -25,14 +25,20 @@ def tradeoff(task, fresh, section, start, workers=1, folder=None):
     """
     judge, own = replace(task, draws=fresh), section | section["tradeoff"] | {"restarts": 1}
     found, _ = twin_search.simulate(judge, start)
-    rows = []
-    for item in missed(found):
-        for weight in (1.0, *section["tradeoff"]["weights"]):
-            path = Path(folder) / f"{item}_{weight:g}.json" if folder else None
-            weighted = replace(task, weights={item: weight})
-            restarts, _ = twin_restarts.search(weighted, own, start, workers, path)
-            parts = _contributions(judge, twin_restarts.best(restarts).twin)
-            rows += [(item, weight, *part) for part in parts]
+
+    def nearest(item, weight):
+        """Contributions of the best candidate where an item has a weight."""
+        path = Path(folder) / f"{item}_{weight:g}.json" if folder else None
+        restarts, _ = twin_restarts.search(replace(task, weights={item: weight}), own, start, workers, path)
+        return _contributions(judge, twin_restarts.best(restarts).twin)
+
+    items, rows = missed(found), []
+    # the same for every item
+    plain = nearest("none", 1.0) if items else []
+    for item in items:
+        rows += [(item, 1.0, *part) for part in plain]
+        for weight in section["tradeoff"]["weights"]:
+            rows += [(item, weight, *part) for part in nearest(item, weight)]
     frame = pd.DataFrame(rows, columns=["item", "weight", "other", "ratio", "contribution_nat"])
     return frame.assign(partner=frame["item"].map(partners(frame)) == frame["other"])
 

@@ -55,6 +55,15 @@ def test_every_hypothesis_has_the_same_budget_and_is_compared_with_the_first_on_
     assert row["inside"] == sum(inside)
 
 
+def test_a_hypothesis_that_cannot_be_driven_has_no_objective(task, few, monkeypatch):
+    def lost(*_arguments):
+        raise twin_search.UnreachableError("lost")
+
+    monkeypatch.setattr(twin_search, "simulate", lost)
+    frame = check("twin_hypotheses", twin_hypotheses.compare(task, draws(50), SMALL, CANDIDATE))
+    assert frame[["objective_nat", "fresh_nat", "gain_nat"]].isna().all(axis=None)
+
+
 def test_a_number_that_weighs_more_is_met_better_and_its_partner_suffers_most(task):
     frame = check("twin_tradeoff", twin_tradeoff.tradeoff(task, draws(50, 8), SMALL, CANDIDATE))
     found, orders = twin_search.simulate(replace(task, draws=draws(50, 8)), CANDIDATE)
