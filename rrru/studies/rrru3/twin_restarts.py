@@ -53,8 +53,10 @@ class Restart:
         return self.low + np.where(self.periodic, genes % 1.0, np.clip(genes, 0.0, 1.0)) * (self.high - self.low)
 
     def advance(self, rate):
-        """One generation; rate: values (n, p) to objectives (n,)."""
-        if self.distribution is None:
+        """One generation, the first of the start itself; rate: values (n, p) to objectives (n,)."""
+        if self.distribution is not None and not self.history:
+            self._rated(rate, self.distribution.mean[None])
+        elif self.distribution is None:
             genes = self.generator.random((self.section["candidates"], len(self.low)))
             scores = self._rated(rate, genes)
             self._begin(genes[scores.argmin()], self.section["spread"])

@@ -15,7 +15,7 @@ from tests.schemas import check
 from tests.studies.rrru3.test_twin import CANDIDATE, CONFIGURED, MOTION
 from tests.studies.rrru3.test_twin_restarts import SECTION
 
-SMALL = SECTION | {"hypotheses": {"restarts": 1, "evaluations": 12}, "tradeoff": {"evaluations": 6, "weights": [9.0]}}
+SMALL = SECTION | {"hypotheses": {"restarts": 1, "evaluations": 13}, "tradeoff": {"evaluations": 6, "weights": [9.0]}}
 
 
 def draws(first, count=3):
@@ -37,7 +37,7 @@ def few(monkeypatch):
 
 def test_every_hypothesis_has_the_same_budget_and_is_compared_with_the_first_on_other_draws(task, few):
     frame = check("twin_hypotheses", twin_hypotheses.compare(task, draws(50, 8), SMALL, CANDIDATE))
-    assert frame["evaluations"].unique().tolist() == [12]
+    assert frame["evaluations"].unique().tolist() == [13]
     assert frame["searched"].tolist() == [33, 33, 36, 42] and len(twin.SEARCH_BOUNDS) == 33
     assert frame["gain_nat"].iloc[0] == 0.0
     np.testing.assert_allclose(frame["gain_nat"], frame["fresh_nat"].iloc[0] - frame["fresh_nat"])

@@ -73,6 +73,12 @@ def test_the_best_stays_in_its_bounds_and_the_progress_never_rises(task, whole):
     assert (progress.groupby("restart")["objective_nat"].diff().dropna() <= 0.0).all()
 
 
+def test_a_search_about_a_twin_is_never_worse_than_it(task):
+    far = SECTION | {"share": 0.5, "evaluations": 7, "restarts": 1}
+    restarts, _ = twin_restarts.search(task, far, CANDIDATE)
+    assert restarts[0].best <= twin_search.cost(list(CANDIDATE.values.values()), task) < twin_search.WORST
+
+
 def test_angles_come_round_and_other_numbers_end_at_their_bounds(task):
     restart = twin_restarts.Restart(task, SECTION, 0, CANDIDATE)
     genes = np.full((1, len(twin.SEARCH_BOUNDS)), 1.25)
