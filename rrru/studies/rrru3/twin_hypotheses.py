@@ -66,7 +66,7 @@ def judged(task, restart):
     printed = ERRORS_MM.items()
     counts = (
         sum(bool(numbers.matched(item, np.median(found[item]), value)) for item, value in printed),
-        sum(bool(low[item] <= value <= high[item]) for item, value in printed),
+        sum(bool(numbers.covered(item, low[item], high[item], value)) for item, value in printed),
         sum(bool(np.median(margin) > 0.0) for margin in orders.values()),
     )
     values = {"objective_nat": objective, "fresh_nat": misfit(found, orders)}

@@ -49,7 +49,7 @@ def missed(found):
     for item, printed in ERRORS_MM.items():
         low, high = np.quantile(found[item], QUANTILES)
         near = numbers.matched(item, np.median(found[item]), printed)
-        if not near and not low <= printed <= high and item not in numbers.UPPER_LIMITS:
+        if not near and not numbers.covered(item, low, high, printed):
             result.append(item)
     return result
 
