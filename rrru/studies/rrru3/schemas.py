@@ -72,7 +72,7 @@ fresh_nat              float? objective of that candidate on draws that no searc
     where it cannot be driven
 gain_nat               float? how much less that is than for the first hypothesis: log of a probability ratio
 medians_met            int    of 17 medians over these draws: within 15 % of the printed number
-inside                 int    of 17 printed numbers: within the middle 90 % of these draws, an upper limit not below them
+inside                 int    of 17 printed numbers: within the middle 90 % of these draws, a limit not below them
 orders_met             int    of 10 orders: hold in more than half of these draws
 
 ## twin_tradeoff | tables/twin_tradeoff.parquet | item weight other
