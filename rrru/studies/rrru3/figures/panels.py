@@ -46,11 +46,11 @@ def draw_along(axes, curve, places, column="error_mm"):
     """
     label, look, errors = curve
     mean, low, high = choose.along(errors, places, (column,))
+    axes.plot(mean.index, mean[column], label=label, **look)
     if f"{column}_low" in errors:
         _, bottom, top = choose.along(errors, places, (f"{column}_low", f"{column}_high"))
         band = {"color": look["color"], "alpha": _BAND_ALPHA, "linewidth": 0.0, "zorder": 0.5}
         axes.fill_between(mean.index, bottom[f"{column}_low"], top[f"{column}_high"], label=_BAND_LABEL, **band)
-    axes.plot(mean.index, mean[column], label=label, **look)
     if choose.passes(places) > 1:
         band = {"color": look["color"], "alpha": 0.18, "linewidth": 0.0}
         axes.fill_between(mean.index, low[column], high[column], label="range over the passes", **band)
