@@ -283,7 +283,7 @@ def twin_search():
     tradeoff = pd.DataFrame(
         [
             (item, weight, other, 0.6 + 0.02 * weight if other == item else 1.0 - 0.03 * weight, 2.0, other == partner)
-            for item, partner in (("group1_after_min", "lines_after_min"), ("lines_after_max", "order_links"))
+            for item, partner in (("group1_after_min", "lines_after_min"), ("lines_after_max", "lines_objective"))
             for weight in (1.0, 4.0, 16.0)
             for other in (item, partner)
         ],

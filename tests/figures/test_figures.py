@@ -60,7 +60,7 @@ WITHOUT_UNIT = (
         "payload changed by (kg)",
         "experiment",
     ),
-    *("evaluations of a restart", "objective (nat)", "order links\n(margin)"),
+    *("evaluations of a restart", "objective (nat)", "lines objective\n(share of printed)"),
     *(f"{item}\n(share of printed)" for item in ("group1 after min", "lines after min", "lines after max")),
     *("experiment, curve driven backwards"),
     *("payload (kg)", "slider", "scatter per travel (µm/mm)", "residual (µm)"),

@@ -85,7 +85,7 @@ other                  str    any printed number or order
 ratio                  float  its median over draws that no search has used, as a share of the printed number; of an
     order its margin
 contribution_nat       float  its contribution to the objective on these draws, without the factor
-partner                bool   the other number that suffers most from the greatest weight
+partner                bool   the other printed number that suffers most from the greatest weight
 
 ## redraws | tables/redraws.parquet | draw item
 The paper's numbers and orders on the same robot for other draws of non-repeatability and noise than in the twin's

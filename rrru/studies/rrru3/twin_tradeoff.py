@@ -55,9 +55,9 @@ def missed(found):
 
 
 def partners(frame):
-    """By item, the other number or order whose contribution rises most from the least weight to the greatest."""
-    result = {}
-    for item, part in frame.groupby("item"):
+    """By item, the other printed number whose contribution rises most from the least weight to the greatest."""
+    result, numbers_only = {}, frame[frame["other"].isin(ERRORS_MM)]
+    for item, part in numbers_only.groupby("item"):
         contribution = part[part["other"] != item].pivot(index="other", columns="weight", values="contribution_nat")
         result[item] = (contribution[contribution.columns[-1]] - contribution[contribution.columns[0]]).idxmax()
     return result

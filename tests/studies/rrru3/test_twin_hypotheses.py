@@ -77,10 +77,11 @@ def test_a_number_that_weighs_more_is_met_better_and_its_partner_suffers_most(ta
 
 
 def test_the_partner_is_the_number_whose_contribution_rises_most():
-    rows = [("a", 1.0, "a", 5.0), ("a", 1.0, "b", 1.0), ("a", 1.0, "c", 2.0)]
-    rows += [("a", 9.0, "a", 1.0), ("a", 9.0, "b", 3.0), ("a", 9.0, "c", 3.5)]
+    item, near, far = "group1_after_min", "lines_after_min", "lines_after_max"
+    rows = [(item, 1.0, item, 5.0), (item, 1.0, near, 1.0), (item, 1.0, far, 2.0), (item, 1.0, "order_links", 1.0)]
+    rows += [(item, 9.0, item, 1.0), (item, 9.0, near, 3.0), (item, 9.0, far, 3.5), (item, 9.0, "order_links", 9.0)]
     frame = pd.DataFrame(rows, columns=["item", "weight", "other", "contribution_nat"])
-    assert twin_tradeoff.partners(frame) == {"a": "b"}
+    assert twin_tradeoff.partners(frame) == {item: near}
 
 
 def test_weights_multiply_single_contributions(task):

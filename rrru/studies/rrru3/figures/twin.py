@@ -31,7 +31,7 @@ def twin_search(tables, _options):
 @style.printed
 def twin_tradeoff(tables, _options):
     """Printed numbers that the twin misses against the number that suffers most where they weigh more in the search:
-    medians over draws as shares of what is printed, a point for every weight. Grey: within 15 % of both.
+    medians over draws as shares of what is printed, a point for every weight. Grey: within 15 % of what is printed.
     """
     table = tables["twin_tradeoff"]
     items = table.loc[table["partner"], "item"].unique()
@@ -53,16 +53,16 @@ def _tradeoff(axes, rows):
     item, partner = rows["item"].iloc[0], rows.loc[rows["partner"], "other"].iloc[0]
     own, other = (rows[rows["other"] == name].sort_values("weight") for name in (item, partner))
     axes.plot(own["ratio"], other["ratio"], "o-", color=style.BLUE, markersize=3.5, linewidth=0.8)
-    for weight, x, y in zip(own["weight"], own["ratio"], other["ratio"], strict=True):
-        axes.annotate(f"x {weight:g}", (x, y), textcoords="offset points", xytext=(4, 4), fontsize=7.0)
+    # searches that found nothing better end at the same place
+    places = own.assign(other=other["ratio"].to_numpy()).groupby(["ratio", "other"])["weight"]
+    for place, weights in places:
+        text = "x " + ", ".join(f"{weight:g}" for weight in weights)
+        axes.annotate(text, place, textcoords="offset points", xytext=(4, 4), fontsize=7.0)
     box = {"facecolor": "#eeeeee", "edgecolor": "none", "zorder": 0}
     axes.axvspan(1.0 - TOLERANCE, 1.0 + TOLERANCE, **box)
-    if not partner.startswith("order_"):
-        axes.axhspan(1.0 - TOLERANCE, 1.0 + TOLERANCE, **box)
+    axes.axhspan(1.0 - TOLERANCE, 1.0 + TOLERANCE, **box)
     axes.set(xlabel=f"{choose.plain(item)}\n(share of printed)", ylabel=f"{choose.plain(partner)}\n(share of printed)")
-    if partner.startswith("order_"):
-        axes.set_ylabel(f"{choose.plain(partner)}\n(margin)")
-    axes.margins(0.15)
+    axes.margins(0.2)
     axes.grid(True)
 
 
