@@ -67,6 +67,13 @@ def test_a_campaign_with_a_draw_measures_what_that_draw_of_the_others_has(campai
     assert redraw.others(chosen, 3) == [0, 1, 3] and redraw.others(campaign, 3) == [0, 1, 2]
 
 
+def test_the_configured_draw_is_nearer_to_the_paper_than_others(campaign):
+    assert campaign.draw is not None
+    chosen = [*redraw.others(campaign, 6), campaign.draw]
+    ranks = redraw.draw_ranks(redraw.draws(campaign, PATTERNS, "least_mean_distance", chosen))
+    assert ranks["draw"].iloc[0] == campaign.draw and (ranks["misfit"].diff().dropna() >= 0.0).all()
+
+
 def test_bands_hold_nine_of_ten_draws_at_every_point(campaign):
     drawn = redraw.draws(campaign, PATTERNS, "least_squares", range(4))
     bands = valid("redraw_errors", redraw.redraw_errors(drawn, campaign.plan.commands(campaign.robot.mechanism)))
