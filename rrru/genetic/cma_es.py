@@ -20,11 +20,11 @@ def run(rate, box, settings, seed):
     Of GeneticSettings it uses the population, all islands together, and the stop criteria. Genes drawn outside of the
     bounds are moved onto them. A distribution without any spread counts as stalled, too.
     """
-    generator, search = np.random.default_rng(seed), _Distribution(box.low.size, sum(settings.populations))
+    generator, search = np.random.default_rng(seed), Distribution(box.low.size, sum(settings.populations))
     stall = settings.stall_generations, settings.stall_tolerance
     best, found, mean, stopped = [], [], [], "generations"
     for generation in range(settings.generations + 1):
-        genes = search.draw(generator)
+        genes = np.clip(search.draw(generator), 0.0, 1.0)
         score = rate(operators.decoded(genes, box))
         first = score.argmin()
         better = not best or score[first] < best[-1]
@@ -46,11 +46,14 @@ def run(rate, box, settings, seed):
     )
 
 
-class _Distribution:
-    """Mean (p,), step size and covariance (p, p) of the next draws, and the evolution paths (p,)."""
+class Distribution:
+    """Mean (p,), step size and covariance (p, p) of the next draws, and the evolution paths (p,).
 
-    def __init__(self, genes, count):
-        self.count, self.mean, self.size, self.learned = count, np.full(genes, _MIDDLE), _SPREAD, 0
+    It begins with independent genes of one spread about a mean, by default in the middle of the bounds.
+    """
+
+    def __init__(self, genes, count, mean=_MIDDLE, spread=_SPREAD):
+        self.count, self.mean, self.size, self.learned = count, np.zeros(genes) + mean, spread, 0
         share = np.log((count + 1) / 2) - np.log(np.arange(1, count // 2 + 1))
         self.weights = share / share.sum()
         mass = self.mass = 1.0 / (self.weights**2).sum()
@@ -69,9 +72,9 @@ class _Distribution:
         return self.size * self.lengths.max()
 
     def draw(self, generator):
-        """Genes (n, p) within the bounds."""
+        """Genes (n, p), also outside of the bounds."""
         normal = generator.standard_normal((self.count, len(self.mean)))
-        return np.clip(self.mean + self.size * (normal * self.lengths) @ self.axes.T, 0.0, 1.0)
+        return self.mean + self.size * (normal * self.lengths) @ self.axes.T
 
     def learn(self, ranked):
         """Update the distribution from genes (n, p), the best first."""

@@ -15,7 +15,7 @@ from rrru.robots.catalogue import OWN
 CALIBRATION_KEYS = tuple(f"calibration.{key}" for key in ("loss", "loss_scale_mm", "use_near_singularity"))
 GENETIC_KEYS = ("seed", "genetic", "calibration.use_near_singularity")
 # keys of a campaign's section that only drive it, or limit further runs
-_DRIVEN = ("trajectories", "passes", "advised_by", "limits")
+_DRIVEN = ("trajectories", "passes", "advised_by", "limits", "draw")
 
 
 def part(config, *keys):
@@ -126,7 +126,7 @@ def virtual(config, name):
         "passes": section.get("passes", [{"reverse": False, "payload_kg": 0.0}]),
         "motion": config["motion"],
         "noise_mm": section["noise_mm"],
-        **{key: section[key] for key in ("targets", "noise_rad") if key in section},
+        **{key: section[key] for key in ("targets", "noise_rad", "draw") if key in section},
     }
 
 

@@ -54,7 +54,7 @@ class VirtualCampaign:
 
     origin: first label of its random streams, in addition to its name; drive: actuator values (N, k) that the
     controller wants, in the order driven, to those sent to the motors, None where these are the same; sees: what the
-    tracker reads.
+    tracker reads; draw: number of the draw of non-repeatability and noise that is measured, None for one of its own.
     """
 
     robot: DrivenRobot
@@ -65,10 +65,15 @@ class VirtualCampaign:
     origin: str = "campaign"
     drive: object = None
     sees: Sees = field(default_factory=Sees)
+    draw: int | None = None
 
     def generator(self, *labels):
         """Random stream of this campaign for a purpose."""
         return stream(self.seed, self.origin, self.name, *labels)
+
+    def drawn(self, label, draw=None):
+        """Random stream of the measurements of a label, in a numbered draw or in that without a number."""
+        return self.generator(*(() if draw is None else ("redraw", draw)), label)
 
     def run(self, controller=None, label="measure"):
         """Measurements, with the actuator values that the controller wants, and truth.
@@ -76,7 +81,7 @@ class VirtualCampaign:
         controller: positions (N, 3) in the order driven to actuator values, by default the nominal inverse kinematics;
         label: of the noise's random stream.
         """
-        mechanism, generator = self.robot.mechanism, self.generator(label)
+        mechanism, generator = self.robot.mechanism, self.drawn(label, self.draw)
         if self.drive is None:
             return self.robot.run(self.plan, self.noise_mm, generator, controller, self.sees)
         path, index = self.plan.path()
@@ -119,7 +124,9 @@ def virtual_campaign(nominal, virtual, advice=None):
     real = real_robot(nominal, virtual["robot"])
     origin = virtual.get("origin", "campaign")
     sees = Sees(virtual.get("targets", {}), virtual.get("noise_rad"))
-    return VirtualCampaign(real, plan, virtual["noise_mm"], virtual["seed"], virtual["name"], origin, sees=sees)
+    return VirtualCampaign(
+        real, plan, virtual["noise_mm"], virtual["seed"], virtual["name"], origin, sees=sees, draw=virtual.get("draw")
+    )
 
 
 def true_deviations(robot, truth):

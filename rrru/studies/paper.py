@@ -8,7 +8,7 @@ import pandas as pd
 
 from rrru.errors import ConfigError
 
-_ABSENT = (np.nan, np.nan)
+_ABSENT, _NO_DRAWS = (np.nan, np.nan), (np.nan, np.nan, np.nan)
 
 
 @dataclass(frozen=True)
@@ -72,8 +72,8 @@ def finding(where, printed, right, unit, shows):
 def published_rows(paper, numbers, here, spread=None, notes=None):
     """Rows of `published` for the numbers that a paper prints, null for absent ones.
 
-    here, spread, notes: item to this study's number, to its (low, high) over other draws, and to an addition to the
-    printed number's note. Raises ConfigError for an item of `here` that the paper does not print.
+    here, spread, notes: item to this study's number, to its (median, low, high) over other draws, and to an addition to
+    the printed number's note. Raises ConfigError for an item of `here` that the paper does not print.
     """
     known = list(dict.fromkeys(number.item for number in numbers))
     if unknown := sorted(set(here) - set(known)):
@@ -93,9 +93,11 @@ def published_rows(paper, numbers, here, spread=None, notes=None):
             for number in numbers
         ]
     )
-    low, high = np.array([spread.get(item, _ABSENT) for item in frame["item"]]).T
+    median, low, high = np.array([spread.get(item, _NO_DRAWS) for item in frame["item"]]).T
+    cases = {"no draws": np.isnan(low), "below": frame["published"] < low, "above": frame["published"] > high}
+    inside = np.select(list(cases.values()), list(cases), "inside")
     ratio = frame["here"] / frame["published"].where(frame["published"] != 0.0)
-    return frame.assign(ratio=ratio, here_low=low, here_high=high)
+    return frame.assign(ratio=ratio, here_median=median, here_low=low, here_high=high, inside=inside)
 
 
 def audit_rows(paper, computed, as_printed=(), lost=None):

@@ -13,11 +13,14 @@ item                   str    what the number is
 source                 str    table, figure, section or sentence of the paper
 unit                   str    unit as printed
 published              float  printed number
-here                   float? this study's number; null where it has none
+here                   float? this study's number; null where it has none. Of paper A's sweeps it is that of the seed
+    nearest to the printed curve
 ratio                  float? here / published; null where either is null or zero
-here_low               float? lower end of the middle 90 % over other draws of non-repeatability and noise; null
+here_median            float? median over other draws of non-repeatability and noise, of sweeps over seeds; null
     without draws
+here_low               float? lower end of the middle 90 % over the same draws or seeds
 here_high              float? upper end
+inside                 str    where the printed number is against these 90 % {inside, below, above, no draws}
 note                   str    what differs, and why
 
 ## audit | tables/audit.parquet | paper where check

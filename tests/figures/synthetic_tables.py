@@ -5,6 +5,7 @@ anything.
 import numpy as np
 import pandas as pd
 
+from rrru.studies.rrru3.sweep_match import sweep_match
 from tests.schemas import TABLES, check
 
 CAMPAIGN = "made_up"
@@ -116,6 +117,16 @@ def error_summary(error_rows):
     return check("error_summary", pd.DataFrame(rows).assign(**none))
 
 
+def redraw_errors(ground):
+    """`redraw_errors`: a band of 1 mm about every curve's place."""
+    frames = []
+    for kind, size in (("none", 5.0), ("line", 0.6), ("spiral", 0.8)):
+        ends = {f"error_{axis}_mm_{end}": edge for axis in _AXES for end, edge in (("low", -0.5), ("high", 0.5))}
+        ends |= {"error_mm_low": size - 0.5, "error_mm_high": size + 0.5}
+        frames.append(ground[["run", "trajectory", "point"]].assign(calibration=kind, **ends))
+    return check("redraw_errors", pd.concat(frames, ignore_index=True))
+
+
 def singularity(path_rows):
     """`singularity` of the commanded points."""
     measure = ((path_rows["command_x_mm"] + 900.0) / 1200.0).clip(0.0, 1.0)
@@ -219,7 +230,7 @@ def genetic(seeds=5):
 
 
 def sweeps(scatter_mm=0.3, seeds=6):
-    """`sweep_runs`, `sweep_effect`, `sweep_pairs`; one run of the crossover fraction 1.0 is infeasible."""
+    """`sweep_runs`, `sweep_effect`, `sweep_pairs`, `sweep_match`; one run at 1.0 is infeasible."""
     generator = np.random.default_rng(3)
     runs, effects, pairs = [], [], []
     for parameter in ("crossover_fraction", "migration_fraction"):
@@ -260,7 +271,26 @@ def sweeps(scatter_mm=0.3, seeds=6):
                         | {"p_value": 0.01, "p_holm": 0.1, "distinguishable": bool(k > 7)}
                     )
     frames = {"sweep_runs": runs, "sweep_effect": effects, "sweep_pairs": pairs}
-    return {name: check(name, pd.DataFrame(rows)) for name, rows in frames.items()}
+    found = {name: check(name, pd.DataFrame(rows)) for name, rows in frames.items()}
+    return found | {"sweep_match": check("sweep_match", sweep_match(found["sweep_runs"]))}
+
+
+def twin_search():
+    """`twin_restarts` and `twin_progress`: four restarts; the first generation of the last cannot be driven."""
+    rows = [(0, 24, 120.0), (0, 600, 95.0), (1, 324, 130.0), (1, 900, 94.8), (2, 324, 110.0), (2, 700, 94.9)]
+    progress = pd.DataFrame([*rows, (3, 324, 1e6), (3, 400, 99.0)], columns=["restart", "evaluations", "objective_nat"])
+    restarts = progress.groupby("restart", as_index=False).last().assign(stopped="stalled", ended="agreed")
+    tradeoff = pd.DataFrame(
+        [
+            (item, weight, other, 0.6 + 0.02 * weight if other == item else 1.0 - 0.03 * weight, 2.0, other == partner)
+            for item, partner in (("group1_after_min", "lines_after_min"), ("lines_after_max", "lines_objective"))
+            for weight in (1.0, 4.0, 16.0)
+            for other in (item, partner)
+        ],
+        columns=["item", "weight", "other", "ratio", "contribution_nat", "partner"],
+    )
+    frames = {"twin_progress": progress, "twin_restarts": restarts, "twin_tradeoff": tradeoff}
+    return {name: check(name, frame) for name, frame in frames.items()}
 
 
 def all_tables(ground=None, **choices):
@@ -272,6 +302,7 @@ def all_tables(ground=None, **choices):
         "measurements": path_rows,
         "errors": error_rows,
         "error_summary": error_summary(error_rows),
+        "redraw_errors": redraw_errors(ground),
         "singularity": singularity(path_rows),
         "workspace": workspace(),
         "campaigns": campaigns(),
@@ -280,4 +311,5 @@ def all_tables(ground=None, **choices):
         "genetic": runs,
         "genetic_history": history,
         **sweeps(),
+        **twin_search(),
     }

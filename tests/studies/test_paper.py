@@ -19,13 +19,15 @@ FINDINGS = (*audit_a.COMPUTED, *audit_a.READ, *audit_b.COMPUTED, *audit_c.COMPUT
 
 
 def test_numbers_stand_beside_the_printed_ones_and_are_null_without_a_study():
-    here, spread, notes = {"length": 2.0, "width": 1}, {"length": (1.0, 3.0)}, {"length": "twice", "angle": "none"}
+    here, spread, notes = {"length": 2.0, "width": 1}, {"length": (2.0, 1.0, 4.0)}, {"length": "twice", "angle": "none"}
     frame = check("published", paper.published_rows("A", NUMBERS, here, spread, notes))
     assert frame["note"].tolist() == ["chosen; twice", "chosen", "twice", "none"]
     np.testing.assert_array_equal(frame["here"], [2.0, 1.0, 2.0, np.nan])
     # nothing is a share of zero
     np.testing.assert_array_equal(frame["ratio"], [0.5, np.nan, 0.4, np.nan])
-    np.testing.assert_array_equal(frame[["here_low", "here_high"]].iloc[[0, 3]], [[1.0, 3.0], [np.nan, np.nan]])
+    drawn = frame[["here_median", "here_low", "here_high"]].iloc[[0, 3]]
+    np.testing.assert_array_equal(drawn, [[2.0, 1.0, 4.0], [np.nan, np.nan, np.nan]])
+    assert frame["inside"].tolist() == ["inside", "no draws", "above", "no draws"]
     assert check("published", paper.published_rows("A", NUMBERS, {}))[["here", "ratio"]].isna().all(axis=None)
 
 

@@ -101,7 +101,7 @@ def test_a_digest_follows_imports_wherever_they_stand(tmp_path, monkeypatch):
     [
         ("printers: {level: 0.04}", {"calibrate_printers", "printer_figures"}),
         ("methods: {test_points: 11}", {"compare_methods", "gather_methods", "method_figures"}),
-        ("reproduce: {redraws: 4}", {"redraws", "published"}),
+        ("reproduce: {redraws: 4}", {"redraws", "published", "paper_a_figures"}),
         (
             "gap: {draws: 150}",
             {

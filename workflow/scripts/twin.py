@@ -1,38 +1,23 @@
 """Search for the twin: the virtual robot and spiral nearest to the paper's numbers."""
 
-import logging
-
 from rrru.pipeline import setup
-from rrru.store import overlay
+from rrru.store import overlay, tables
 from rrru.store.job import run
-from rrru.studies.rrru3 import twin, twin_search
+from rrru.studies.rrru3 import twin, twin_restarts, twin_search
+from rrru.studies.rrru3.schemas import TABLES
 
 
 def main(settings, inputs, outputs):
-    """Write the twin as an overlay of the configuration."""
+    """Write the twin as an overlay of the configuration, and the search's restarts and progress."""
     virtual, section = settings["virtual"], settings["twin"]
     campaign = setup.virtual_campaign(settings["nominal"], virtual)
-    # other draws than those of `redraws`
-    pairs = [
-        [campaign.generator("twin", number, name) for name in ("measure", "closed_loop")]
-        for number in range(section["draws"])
-    ]
-    task = twin_search.Task(
-        setup.mechanism(settings["nominal"]),
-        virtual["motion"],
-        virtual["trajectories"],
-        campaign.noise_mm,
-        twin_search.draw(pairs, len(campaign.plan.targets())),
-        settings["reproduce"]["line_calibration"],
-    )
+    calibration = settings["reproduce"]["line_calibration"]
+    task = twin_search.make_task(campaign, virtual, section["draws"], calibration, tuple(section["more"]))
     start = twin.from_config(virtual) if section["refine"] else None
-    best, misfit = twin_search.search(task, section, start, settings["workers"], _log)
-    overlay.write(twin.overlay(best), misfit, outputs["twin"])
-
-
-def _log(intermediate_result):
-    """Log the progress of a generation."""
-    logging.info("generation %d: misfit %.3f", intermediate_result.nit, intermediate_result.fun)
+    restarts, ended = twin_restarts.search(task, section, start, settings["workers"], settings["state"])
+    best = twin_restarts.best(restarts)
+    overlay.write(twin.overlay(best.twin), best.best, outputs["twin"])
+    tables.write_all(TABLES, twin_restarts.tables(restarts, ended), outputs)
 
 
 if __name__ == "__main__":

@@ -50,7 +50,8 @@ def published_rows(section, points, camera, draws):
             ("about", size.mean(), "mean"),
         ):
             here[f"{label}_{item}"] = value
-            spread[f"{label}_{item}"] = tuple(drawn.loc[variant, [f"plane_{kind}_{end}_mm" for end in ("low", "high")]])
+            columns = [f"plane_{kind}_{end}_mm" for end in ("median", "low", "high")]
+            spread[f"{label}_{item}"] = tuple(drawn.loc[variant, columns])
     return paper.published_rows("C", NUMBERS, here, spread)
 
 

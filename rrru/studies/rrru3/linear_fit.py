@@ -1,5 +1,8 @@
 """Least mean distance of many draws on a linearised model, fast enough for every candidate of the twin's search."""
 
+from typing import NamedTuple
+
+import numba
 import numpy as np
 
 from rrru.calibration.identifiability import RANK_TOLERANCE
@@ -7,8 +10,9 @@ from rrru.errors import FitError
 
 # weight in mm of the squared excess over a bound, in half widths: violations are some thousandths
 _STIFFNESS = 10.0
-# tested fractions of a Newton step
-_SIZES = np.array([0.0, *0.5 ** np.arange(10)])
+# Newton steps, the smallest tried share of one, and the gain in mm below which a draw is solved
+_MOST_STEPS, _LEAST_SHARE, _LEAST_GAIN_MM = 60, 1e-3, 1e-7
+_LEAST_DISTANCE_MM = 1e-9
 
 
 def linear_fit(mechanism, theta, measured, start):
@@ -26,7 +30,7 @@ def linear_fit(mechanism, theta, measured, start):
     residual, jacobian = _linearised(mechanism, theta, centre, start, deviations)
     whitened = np.linalg.qr(jacobian.reshape(-1, len(deviations)))
     back = np.linalg.inv(whitened.R)
-    bounds = _Bounds(back, deviations, parameters.low, parameters.high)
+    bounds = _bounds(back, deviations, parameters.low, parameters.high)
     q, value = _least_mean(residual + (measured - centre), whitened.Q.reshape(jacobian.shape), bounds)
     return deviations + q @ back.T, value
 
@@ -40,27 +44,17 @@ def _linearised(mechanism, theta, measured, start, deviations):
     return residual, jacobian
 
 
-class _Bounds:
-    """Quadratic penalty on violated bounds of deviations about a centre, in coordinates q: value, slope, curvature."""
+class _Bounds(NamedTuple):
+    """Place of deviations within their bounds, in half widths: middle (p,) + back (p, p) q; violated beyond 1."""
 
-    def __init__(self, back, centre, low, high):
-        self.half = 0.5 * (high - low)
-        self.back, self.middle = back / self.half[:, None], (centre - 0.5 * (high + low)) / self.half
+    back: np.ndarray
+    middle: np.ndarray
 
-    def excess(self, q):
-        """Signed excess (..., p), in half widths."""
-        place = self.middle + q @ self.back.T
-        return place - np.clip(place, -1.0, 1.0)
 
-    def value(self, q):
-        """Penalties (...)."""
-        return _STIFFNESS * (self.excess(q) ** 2).sum(axis=-1)
-
-    def gradient_and_hessian(self, q):
-        """First and second derivatives (d, p), (d, p, p) of the penalties."""
-        excess = self.excess(q)
-        bend = np.einsum("dk,kp,kq->dpq", excess != 0.0, self.back, self.back)
-        return 2.0 * _STIFFNESS * excess @ self.back, 2.0 * _STIFFNESS * bend
+def _bounds(back, centre, low, high):
+    """The _Bounds of deviations centre + back q."""
+    half = 0.5 * (high - low)
+    return _Bounds(np.ascontiguousarray(back / half[:, None]), (centre - 0.5 * (high + low)) / half)
 
 
 def _least_mean(residual, basis, bounds):
@@ -68,35 +62,91 @@ def _least_mean(residual, basis, bounds):
 
     Damped Newton from least squares; the basis is orthonormal.
     """
-    q = np.einsum("dna,nap->dp", residual, basis)
-
-    def cost(q):
-        return np.linalg.norm(residual - _moved(basis, q), axis=-1).mean(axis=-1) + bounds.value(q)
-
-    value, every = cost(q), np.arange(len(q))
-    for _ in range(60):
-        step = _newton_step(residual - _moved(basis, q), basis, *bounds.gradient_and_hessian(q))
-        tried = q + _SIZES[:, None, None] * step
-        costs = cost(tried)
-        best = costs.argmin(axis=0)
-        q, previous, value = tried[best, every], value, costs[best, every]
-        if (previous - value).max() < 1e-7:
-            break
-    return q, value
+    start, gram = np.einsum("dna,nap->dp", residual, basis), np.einsum("nap,naq->npq", basis, basis)
+    arrays = (residual, basis, gram, start, bounds.back, bounds.middle)
+    return _newton(*(np.ascontiguousarray(array) for array in arrays))
 
 
-def _moved(basis, q):
-    """Basis (n, 3, p) times coordinates (..., p), (..., n, 3)."""
-    return np.tensordot(q, basis, axes=([-1], [2]))
+@numba.njit(cache=True)
+def _newton(residual, basis, gram, start, back, middle):
+    """The result of `_least_mean`, one draw after another; gram (n, p, p): basis^T basis of every point."""
+    draws, points, size = residual.shape[0], residual.shape[1], basis.shape[2]
+    found, least = start.copy(), np.empty(draws)
+    left, moved, along = np.empty((points, 3)), np.empty((points, 3)), np.empty(size)
+    slope, bend, place, moves = np.empty(size), np.empty((size, size)), np.empty(size), np.empty(size)
+    for d in range(draws):
+        q = found[d]
+        for n in range(points):
+            for a in range(3):
+                left[n, a] = residual[d, n, a]
+                for p in range(size):
+                    left[n, a] -= basis[n, a, p] * q[p]
+        for k in range(size):
+            place[k] = middle[k]
+            for p in range(size):
+                place[k] += back[k, p] * q[p]
+        value = _value(left, moved, 0.0, place, moves)
+        for _ in range(_MOST_STEPS):
+            slope[:], bend[:] = 0.0, 0.0
+            for n in range(points):
+                weight = 1.0 / max(np.sqrt(left[n, 0] ** 2 + left[n, 1] ** 2 + left[n, 2] ** 2), _LEAST_DISTANCE_MM)
+                for p in range(size):
+                    along[p] = weight * (
+                        left[n, 0] * basis[n, 0, p] + left[n, 1] * basis[n, 1, p] + left[n, 2] * basis[n, 2, p]
+                    )
+                    slope[p] += along[p] / points
+                    for k in range(p + 1):
+                        bend[p, k] += weight * (gram[n, p, k] - along[p] * along[k]) / points
+            for k in range(size):
+                excess = place[k] - min(max(place[k], -1.0), 1.0)
+                if excess != 0.0:
+                    for p in range(size):
+                        slope[p] -= 2.0 * _STIFFNESS * excess * back[k, p]
+                        for m in range(p + 1):
+                            bend[p, m] += 2.0 * _STIFFNESS * back[k, p] * back[k, m]
+            for p in range(size):
+                for k in range(p):
+                    bend[k, p] = bend[p, k]
+            step = np.linalg.solve(bend, slope)
+            for n in range(points):
+                for a in range(3):
+                    moved[n, a] = 0.0
+                    for p in range(size):
+                        moved[n, a] += basis[n, a, p] * step[p]
+            for k in range(size):
+                moves[k] = 0.0
+                for p in range(size):
+                    moves[k] += back[k, p] * step[p]
+            share, tried = 1.0, _value(left, moved, 1.0, place, moves)
+            while not tried < value and share > _LEAST_SHARE:
+                share *= 0.5
+                tried = _value(left, moved, share, place, moves)
+            if not tried < value:
+                break
+            gain, value = value - tried, tried
+            for p in range(size):
+                q[p] += share * step[p]
+                place[p] += share * moves[p]
+            for n in range(points):
+                for a in range(3):
+                    left[n, a] -= share * moved[n, a]
+            if gain < _LEAST_GAIN_MM:
+                break
+        least[d] = value
+    return found, least
 
 
-def _newton_step(residual, basis, slope, bend):
-    """Newton steps (d, p) of mean distances of residuals (d, n, 3) that change by -basis (n, 3, p), and penalties."""
-    distance = np.maximum(np.linalg.norm(residual, axis=-1), 1e-9)
-    count = distance.shape[1]
-    along = np.einsum("dna,nap->dnp", residual / distance[..., None], basis)
-    weight = 1.0 / distance
-    gram = np.einsum("nap,naq->npq", basis, basis)
-    turned = along * np.sqrt(weight)[..., None]
-    hessian = np.tensordot(weight, gram, axes=([1], [0])) - turned.transpose(0, 2, 1) @ turned
-    return np.linalg.solve(hessian / count + bend, (along.mean(axis=1) - slope)[..., None])[..., 0]
+@numba.njit(cache=True)
+def _value(left, moved, share, place, moves):
+    """Mean distance of residuals left (n, 3) after a share of a step, which changes them by -moved, and the penalty."""
+    total = 0.0
+    for n in range(left.shape[0]):
+        square = 0.0
+        for a in range(3):
+            square += (left[n, a] - share * moved[n, a]) ** 2 if share > 0.0 else left[n, a] ** 2
+        total += np.sqrt(square)
+    total /= left.shape[0]
+    for k in range(place.shape[0]):
+        at = place[k] + share * moves[k] if share > 0.0 else place[k]
+        total += _STIFFNESS * (at - min(max(at, -1.0), 1.0)) ** 2
+    return total

@@ -102,3 +102,11 @@ ORDERS = (
 )
 NUMBERS = DESIGN + SWEEPS + FITTED + ERRORS + REPEATED + ORDERS
 ERRORS_MM = {number.item: number.value for number in ERRORS}
+# printed with a last zero
+_DECIMALS = {"group1_after_max": 3}
+
+
+def printed_half_mm(item):
+    """Half a unit of the last digit to which an error is printed."""
+    text = f"{ERRORS_MM[item]:.10g}"
+    return 0.5 * 10.0 ** -_DECIMALS.get(item, len(text.partition(".")[2]))

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+import numpy as np
 import pandas as pd
 
 from rrru.campaign.measurements import vectors
@@ -10,7 +11,9 @@ from rrru.pipeline import setup
 from rrru.robots.rrru3 import Rrru3
 from rrru.studies import paper
 from rrru.studies.rrru3 import study_numbers as computed
-from rrru.studies.rrru3.paper import NUMBERS, SETTINGS, TIED, TIED_TO_PRINTED
+from rrru.studies.rrru3.paper import NUMBERS, TIED, TIED_TO_PRINTED
+from rrru.studies.rrru3.redraw import QUANTILES
+from rrru.studies.rrru3.sweep_match import PRINTED, nearest_seed
 
 _DIMENSIONS = ("L1_mm", "L2_mm", "L3_mm", "R_mm", "r_mm")
 
@@ -40,15 +43,17 @@ def published_rows(settings, errors, calibrations, parameters, genetic, genetic_
     parameters = pd.concat([parameters, typical_parameters(genetic, found, (*names, "dR", "dr"))], ignore_index=True)
     runs = genetic[genetic["calibration"] == chosen.line_calibration]
     numbers, order_notes = _error_numbers(errors, parameters, chosen)
+    swept, swept_spread = _sweep(sweep_runs, settings["genetic"]["operators"])
     here = {
         **_design(nominal, virtual, settings["genetic"]),
-        **_sweep(sweep_runs, settings["genetic"]["operators"]),
+        **swept,
         **_fitted(parameters, chosen),
         **numbers,
         "lines_objective": _objective(calibrations, runs, chosen),
     }
     counts = redraw_counts[redraw_counts["kind"] != "count"].set_index("item")
-    spread = {row.Index: (row.low, row.high) for row in counts[counts["kind"] == "number"].itertuples()}
+    spread = {row.Index: (row.median, row.low, row.high) for row in counts[counts["kind"] == "number"].itertuples()}
+    spread |= swept_spread
     notes = _notes(runs, parameters, chosen) | order_notes
     for row in counts.itertuples():
         text = f"{'holds' if row.kind == 'order' else 'within 15 %'} in {row.met} of {row.draws} other draws"
@@ -78,12 +83,24 @@ def _design(nominal, virtual, genetic):
 
 
 def _sweep(runs, operators):
-    """Median objective of a single population, run to the end, at every swept value that the paper has."""
+    """Objectives of a single population, run to the end, at every swept value that the paper has.
+
+    By item: those of the seed that is nearest to the printed curve, and (median, low, high) over all seeds.
+    """
     chosen = (runs["population"] == "one") & (runs["operators"] == operators) & (runs["stop"] == "end")
-    median = runs[chosen].groupby(["parameter", "value"])["objective_mm"].median()
-    labels = {"crossover_fraction": "P_c", "migration_fraction": "P_m"}
-    printed = {(parameter, float(s)): f"{label}={s}" for parameter, label in labels.items() for s in SETTINGS}
-    return {printed[key]: objective for key, objective in median.items() if key in printed}
+    here, spread = {}, {}
+    for parameter, label in (("crossover_fraction", "P_c"), ("migration_fraction", "P_m")):
+        _, printed = PRINTED[parameter]
+        swept = runs[chosen & (runs["parameter"] == parameter) & runs["value"].isin(printed)]
+        if swept.empty:
+            continue
+        seed, _ = nearest_seed(swept, printed)
+        for value, part in swept.groupby("value"):
+            item = f"{label}={value:.1f}"
+            here[item] = float(part.loc[part["seed"] == seed, "objective_mm"].iloc[0])
+            low, high = np.quantile(part["objective_mm"], QUANTILES)
+            spread[item] = (float(part["objective_mm"].median()), float(low), float(high))
+    return here, spread
 
 
 def _fitted(parameters, chosen):

@@ -2,7 +2,7 @@
 and driven again.
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
@@ -15,32 +15,79 @@ from rrru.simulation.driven import non_repeatability
 from rrru.simulation.tracker import measure
 from rrru.studies.rrru3 import study_numbers as numbers
 from rrru.studies.rrru3.paper import ERRORS_MM
+from rrru.studies.rrru3.twin_objective import draw_misfit
 
 # the middle 90 % of the draws
-_QUANTILES = (0.05, 0.95)
+QUANTILES = (0.05, 0.95)
+_KINDS = ("none", "line", "spiral")
+PLACE = ["run", "trajectory", "point"]
 
 
-def redraws(campaign, patterns, method, count, use_near_singularity=True):
-    """Rows of `redraws` of a virtual campaign over `count` draws.
+@dataclass(frozen=True)
+class Draw:
+    """One draw: its number, the paper's numbers in mm and margins of its orders by name, and error vectors.
+
+    errors_mm: (n, 3) at all points before calibration and after the line and the spiral calibration.
+    """
+
+    number: int
+    found: dict
+    orders: dict
+    errors_mm: tuple
+
+
+def draws(campaign, patterns, method, chosen, use_near_singularity=True):
+    """The Draws of chosen numbers of a virtual campaign.
 
     patterns: trajectories of the line and of the spiral calibration; method: "genetic" is replaced by its optimum, the
-    least mean distance. Empty where the numbers do not apply.
+    least mean distance. None where the numbers do not apply.
     """
-    columns = ["draw", "item", "kind", "value", "met"]
-    if count == 0 or not {run.trajectory for run in campaign.plan.runs} >= numbers.TRAJECTORIES:
-        return pd.DataFrame(columns=columns)
+    if not len(chosen) or not {run.trajectory for run in campaign.plan.runs} >= numbers.TRAJECTORIES:
+        return []
     measurements, _ = campaign.run()
     usable = rows.usable(measurements, use_near_singularity)
-    chosen = [usable & rows.on_trajectories(measurements, names) for names in patterns]
+    calibrated = [usable & rows.on_trajectories(measurements, names) for names in patterns]
     motion = campaign.robot.motion(campaign.plan, campaign.robot.mechanism.inverse)
+    return [_draw(campaign, measurements, motion, calibrated, method, number) for number in chosen]
+
+
+def others(campaign, count):
+    """Numbers of the first draws that the campaign does not measure itself."""
+    return [number for number in range(count + 1) if number != campaign.draw][:count]
+
+
+def redraws(drawn):
+    """Rows of `redraws` of Draws."""
     result = []
-    for draw in range(count):
-        found, orders = _draw(campaign, measurements, motion, chosen, method, draw)
-        for item, value in found.items():
+    for draw in drawn:
+        for item, value in draw.found.items():
             met = bool(numbers.matched(item, value, ERRORS_MM[item]))
-            result.append((draw, item, "number", float(value), met))
-        result += [(draw, f"order_{name}", "order", float(value), bool(value > 0.0)) for name, value in orders.items()]
-    return pd.DataFrame(result, columns=columns)
+            result.append((draw.number, item, "number", float(value), met))
+        for name, value in draw.orders.items():
+            result.append((draw.number, f"order_{name}", "order", float(value), bool(value > 0.0)))
+    return pd.DataFrame(result, columns=["draw", "item", "kind", "value", "met"])
+
+
+def draw_ranks(drawn):
+    """Rows of `draw_ranks` of Draws, the one nearest to the printed numbers and orders first."""
+    met = redraws(drawn).groupby(["draw", "kind"])["met"].sum().unstack()
+    frame = pd.DataFrame(
+        [(draw.number, draw_misfit(draw.found, draw.orders)) for draw in drawn], columns=["draw", "misfit"]
+    ).sort_values(["misfit", "draw"], ignore_index=True)
+    rank = np.arange(1, len(frame) + 1)
+    return frame.assign(rank=rank, **{f"{kind}s_met": met.loc[frame["draw"], kind].to_numpy() for kind in met})
+
+
+def redraw_errors(drawn, commands):
+    """Rows of `redraw_errors`: middle 90 % of the errors of Draws at every point; commands: a plan's table."""
+    columns = [*(f"error_{axis}_mm" for axis in "xyz"), "error_mm"]
+    ends = [f"{column}_{end}" for end in ("low", "high") for column in columns]
+    frames = [pd.DataFrame(columns=[*PLACE, "calibration", *ends])]
+    for kind, *errors in zip(_KINDS, *(draw.errors_mm for draw in drawn), strict=True) if drawn else ():
+        every = np.concatenate([errors, np.linalg.norm(errors, axis=-1, keepdims=True)], axis=-1)
+        middle = np.concatenate(np.quantile(every, QUANTILES, axis=0), axis=-1)
+        frames.append(commands[PLACE].assign(calibration=kind, **dict(zip(ends, middle.T, strict=True))))
+    return pd.concat(frames[1:] or frames, ignore_index=True)
 
 
 def redraw_counts(found):
@@ -60,7 +107,7 @@ def redraw_counts(found):
 
 def _middle(values):
     """Median and middle 90 % of values."""
-    low, high = np.quantile(values, _QUANTILES)
+    low, high = np.quantile(values, QUANTILES)
     return {"median": float(np.median(values)), "low": float(low), "high": float(high)}
 
 
@@ -81,11 +128,11 @@ def _measured(campaign, attained, generator):
 
 
 def _draw(campaign, measurements, motion, chosen, method, number):
-    """Numbers and margins of orders of one draw; chosen: rows (n,) of the line and of the spiral calibration."""
+    """One Draw; chosen: rows (n,) of the line and of the spiral calibration."""
     mechanism, target = campaign.robot.mechanism, rows.command(measurements)
     theta, trajectory = rows.actuators(measurements, mechanism), measurements["trajectory"]
     attained = campaign.robot.positions(motion, campaign.plan.targets())[0]
-    measured = _measured(campaign, attained, campaign.generator("redraw", number, "measure"))
+    measured = _measured(campaign, attained, campaign.drawn("measure", number))
     fits, after = [], []
     for calibrated in chosen:
         residuals = TargetPositions(mechanism, theta[calibrated], measured[calibrated], target[calibrated])
@@ -93,11 +140,12 @@ def _draw(campaign, measurements, motion, chosen, method, number):
         if method != "least_squares":
             fit = least_mean_distance(residuals, fit.deviations)
         # the same draw for both calibrations
-        generator = campaign.generator("redraw", number, "closed_loop")
+        generator = campaign.drawn("closed_loop", number)
         after.append(_measured(campaign, _attained(campaign, motion, fit.deviations), generator) - target)
         fits.append(fit)
     names = [mechanism.parameters.names.index(name) for name in numbers.LINKS]
     errors = measured - target, *after
     orders = numbers.group_orders(trajectory, *errors) | numbers.spike_orders(trajectory, *errors[:2])
     orders |= numbers.link_order(*(fit.deviations[names] for fit in fits))
-    return numbers.study_numbers(trajectory, *errors) | {"lines_objective": fits[0].mean_mm}, orders
+    found = numbers.study_numbers(trajectory, *errors) | {"lines_objective": fits[0].mean_mm}
+    return Draw(number, found, orders, errors)

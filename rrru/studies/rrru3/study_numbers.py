@@ -60,6 +60,11 @@ def matched(item, value, published):
     return (deviation if item in UPPER_LIMITS else np.abs(deviation)) <= TOLERANCE
 
 
+def covered(item, low, high, published):
+    """Whether a range of numbers here holds the printed one; an upper limit is met where the range begins below it."""
+    return low <= published and (item in UPPER_LIMITS or published <= high)
+
+
 def group_orders(trajectory, before_mm, under_lines_mm, under_spiral_mm):
     """The paper's orders of the line groups as margins (...), positive where they hold: name to ratio - 1.
 

@@ -35,6 +35,17 @@ def sweep_match(runs, seed=0):
     return pd.DataFrame(rows)
 
 
+def nearest_seed(runs, printed):
+    """The seed whose single curve is nearest to a printed one, and its distance in mm, each minus its mean.
+
+    runs: of one sweep; printed: value to objective. Values at which a run of the seed is infeasible do not count.
+    """
+    curves = runs[np.isfinite(runs["objective_mm"])].pivot(index="seed", columns="value", values="objective_mm")
+    off = curves - np.array([printed[value] for value in curves.columns])
+    distance = np.sqrt(off.sub(off.mean(axis=1), axis=0).pow(2).mean(axis=1))
+    return int(distance.idxmin()), float(distance.min())
+
+
 def _row(group, key, printed, shared, seed):
     """One sweep compared with the printed curve; shared: values that all sweeps of this table have."""
     samples = {value: part.to_numpy() for value, part in group.groupby("value")["objective_mm"]}
@@ -46,7 +57,7 @@ def _row(group, key, printed, shared, seed):
     low, high = np.quantile(_centred_distance(drawn, medians), _MIDDLE)
     ranges = np.quantile(np.ptp(drawn, axis=1), _MIDDLE)
     reproduced = low <= distance <= high and ranges[0] <= np.ptp(curve) <= ranges[1]
-    common = np.isin(list(samples), shared)
+    common, (seed, seed_distance) = np.isin(list(samples), shared), nearest_seed(group, printed)
     return dict(zip(SWEEP, key, strict=True)) | {
         "settings": len(samples),
         "runs": len(group),
@@ -54,6 +65,8 @@ def _row(group, key, printed, shared, seed):
         "distance_mm": float(distance),
         "chance_low_mm": float(low),
         "chance_high_mm": float(high),
+        "nearest_seed": seed,
+        "nearest_seed_mm": seed_distance,
         "distance_shared_mm": float(_centred_distance(medians[common], curve[common])),
         "scatter_mm": float(np.median([np.ptp(sample) for sample in samples.values()])),
         "range_mm": float(np.ptp(medians)),

@@ -38,8 +38,25 @@ SEARCH_BOUNDS = {
     "turns": (1.5, 4.0),
     "start_deg": (-180.0, 180.0),
 }
+# angles that come round
+PERIODIC = ("start_deg", *(f"phase{k}" for k in _LEGS))
 # no bounds: only the sign counts, or angles that come round
-_UNBOUNDED = {"side", "start_deg", *(f"phase{k}" for k in _LEGS)}
+_UNBOUNDED = {"side", *PERIODIC}
+# numbers that single hypotheses add: effect to (low, high) by name
+_MORE_EFFECTS = {
+    "drive_compliance": {f"compliance{k}": (0.0, 2e-7) for k in _LEGS},
+    "link_flexure": {f"flexure{k}": (0.0, 0.02) for k in _LEGS},
+    "leg_asymmetry": {f"dL{link}_leg{k}": (-1.5, 1.5) for k in _LEGS for link in (1, 2, 3)},
+    "axis_tilt": {f"tilt_{axis}{k}": (-0.004, 0.004) for k in _LEGS for axis in "xz"},
+    "base_placement": {
+        f"{name}{k}": (-width, width)
+        for k in _LEGS
+        for name, width in (("azimuth", 0.005), ("radius", 2.0), ("height", 2.0))
+    },
+}
+# errors in rad of the first drive's command at single points of group 1, from 1 on; ASSUME which, Fig. 9 has no numbers
+SPIKE_POINTS = {"spike1": 7, "spike2": 13, "spike3": 20}
+_MORE = {**_MORE_EFFECTS, "spikes": {name: (-0.01, 0.01) for name in SPIKE_POINTS}}
 # a number ends at a bound within this share of the bounds' width
 _AT_BOUND = 0.01
 # keys of the configuration that hold several searched numbers
@@ -55,6 +72,11 @@ _SPIRAL = {
 }
 
 
+def search_bounds(more=()):
+    """Bounds (low, high) by name of all searched numbers, with those of additional effects, or "spikes"."""
+    return SEARCH_BOUNDS | {name: limits for effect in more for name, limits in _MORE[effect].items()}
+
+
 @dataclass(frozen=True)
 class Twin:
     """A candidate: its searched values by name."""
@@ -65,7 +87,10 @@ class Twin:
         """The searched part of a `virtual_robots:` entry."""
         effects = {effect: {name: self.values[name] for name in names} for effect, names in _EFFECTS.items()}
         # a whole number of periods a turn
-        effects["transmission_error"]["ratio"] = float(round(self.values["ratio"]))
+        effects["transmission_error"]["ratio"] = float(max(round(self.values["ratio"]), 1))
+        for effect, names in _MORE_EFFECTS.items():
+            if own := {name: self.values[name] for name in names if name in self.values}:
+                effects[effect] = own
         geometry = {name: self.values[name] for name in _GEOMETRY}
         return {"errors": geometry, "effects": effects, "wobble_mm": self.values["wobble_mm"]}
 
@@ -115,9 +140,10 @@ def from_config(virtual):
         **{name: value for key, names in _SPIRAL.items() for name, value in zip(names, spiral[key], strict=True)},
         **{key: spiral[key] for key in ("turns", "start_deg")},
     }
-    if other := sorted(set(values) ^ set(SEARCH_BOUNDS)):
+    bounds = search_bounds(effect for effect in robot["effects"] if effect in _MORE)
+    if other := sorted(set(values) ^ set(bounds)):
         raise ConfigError(f"twin: campaign {virtual['name']} differs in {other} from the searched numbers")
-    return Twin({name: float(values[name]) for name in SEARCH_BOUNDS})
+    return Twin({name: float(values[name]) for name in bounds})
 
 
 def numbers(virtual):
@@ -128,13 +154,13 @@ def numbers(virtual):
         values = from_config(virtual).values if seven else {}
     except ConfigError:
         values = {}
-    rows = [(name, value, *SEARCH_BOUNDS[name], _at_bound(name, value)) for name, value in values.items()]
+    bounds = search_bounds(_MORE)
+    rows = [(name, value, *bounds[name], _at_bound(name, value, *bounds[name])) for name, value in values.items()]
     return pd.DataFrame(rows, columns=columns)
 
 
-def _at_bound(name, value):
+def _at_bound(name, value, low, high):
     """Whether a searched number ended at a bound."""
-    low, high = SEARCH_BOUNDS[name]
     return name not in _UNBOUNDED and min(value - low, high - value) < _AT_BOUND * (high - low)
 
 

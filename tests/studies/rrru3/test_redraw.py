@@ -25,7 +25,7 @@ def campaign():
 
 @pytest.fixture(scope="module")
 def found(campaign):
-    return redraw.redraws(campaign, PATTERNS, "least_mean_distance", 3)
+    return redraw.redraws(redraw.draws(campaign, PATTERNS, "least_mean_distance", range(3)))
 
 
 def valid(name, frame):
@@ -46,13 +46,43 @@ def test_every_target_stands_in_every_draw(found):
 
 def test_a_robot_that_repeats_itself_has_one_answer(campaign):
     still = replace(campaign, robot=replace(campaign.robot, non_repeatability_mm=0.0), noise_mm=0.0)
-    values = redraw.redraws(still, PATTERNS, "least_squares", 2).set_index(["draw", "item"])["value"]
+    drawn = redraw.draws(still, PATTERNS, "least_squares", range(2))
+    values = redraw.redraws(drawn).set_index(["draw", "item"])["value"]
     assert values[0].to_dict() == values[1].to_dict()
     # driven again by the way that every campaign goes
     measurements, _ = still.run()
     target, first = numbers_of(measurements)
     size = np.linalg.norm(first - target, axis=1)[measurements["trajectory"] == "line_1"]
     assert values[0, "group1_before_max"] == pytest.approx(size.max(), abs=1e-9)
+
+
+def test_a_campaign_with_a_draw_measures_what_that_draw_of_the_others_has(campaign):
+    chosen = replace(campaign, draw=2)
+    (drawn,) = redraw.draws(campaign, PATTERNS, "least_squares", [2])
+    measurements, _ = chosen.run()
+    target, measured = numbers_of(measurements)
+    np.testing.assert_allclose(measured - target, drawn.errors_mm[0], atol=1e-12)
+    again, _ = chosen.run(label="closed_loop")
+    assert not np.allclose([*numbers_of(again)][1], measured)
+    assert redraw.others(chosen, 3) == [0, 1, 3] and redraw.others(campaign, 3) == [0, 1, 2]
+
+
+def test_the_configured_draw_is_nearer_to_the_paper_than_others(campaign):
+    assert campaign.draw is not None
+    chosen = [*redraw.others(campaign, 6), campaign.draw]
+    ranks = redraw.draw_ranks(redraw.draws(campaign, PATTERNS, "least_mean_distance", chosen))
+    assert ranks["draw"].iloc[0] == campaign.draw and (ranks["misfit"].diff().dropna() >= 0.0).all()
+
+
+def test_bands_hold_nine_of_ten_draws_at_every_point(campaign):
+    drawn = redraw.draws(campaign, PATTERNS, "least_squares", range(4))
+    bands = valid("redraw_errors", redraw.redraw_errors(drawn, campaign.plan.commands(campaign.robot.mechanism)))
+    assert len(bands) == 3 * len(drawn[0].errors_mm[0])
+    row = bands[(bands["calibration"] == "spiral") & (bands["trajectory"] == "line_2") & (bands["point"] == 5)].iloc[0]
+    place = 26 + 4
+    sizes = sorted(np.linalg.norm(draw.errors_mm[2][place]) for draw in drawn)
+    assert row["error_mm_low"] == pytest.approx(sizes[0] + 0.15 * (sizes[1] - sizes[0]))
+    assert row["error_x_mm_high"] == pytest.approx(np.quantile([draw.errors_mm[2][place, 0] for draw in drawn], 0.95))
 
 
 def numbers_of(frame):
@@ -73,7 +103,8 @@ def test_counts_by_hand():
 
 
 def test_without_draws_the_tables_are_empty(campaign):
-    empty = redraw.redraws(campaign, PATTERNS, "least_squares", 0)
+    empty = redraw.redraws(redraw.draws(campaign, PATTERNS, "least_squares", []))
+    assert valid("redraw_errors", redraw.redraw_errors([], campaign.plan.commands(campaign.robot.mechanism))).empty
     assert valid("redraws", empty).empty and valid("redraw_counts", redraw.redraw_counts(empty)).empty
 
 

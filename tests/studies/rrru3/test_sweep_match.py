@@ -5,6 +5,7 @@ import pandas as pd
 import pytest
 
 from rrru.studies.rrru3.paper import CROSSOVER, MIGRATION
+from rrru.studies.rrru3.published import _sweep
 from rrru.studies.rrru3.schemas import TABLES
 from rrru.studies.rrru3.sweep_match import sweep_match
 
@@ -61,3 +62,25 @@ def test_infeasible_runs_and_unprinted_values_are_left_out():
     other = runs([0.6, 0.6], 0.001, values=[0.15, 0.25])
     row = match(frame, other).iloc[0]
     assert (row["runs"], row["settings"]) == (199, 10) and np.isfinite(row["distance_mm"])
+
+
+def test_the_nearest_seed_by_brute_force_and_published_shows_it_with_the_range_over_seeds():
+    frame = runs(np.array(CROSSOVER) + 0.1, 0.02, "crossover_fraction", "matlab_gaussian", seeds=12)
+    frame.loc[(frame["seed"] == 3) & (frame["value"] == 1.0), "objective_mm"] = np.inf
+    distances = {}
+    for seed, part in frame.groupby("seed"):
+        part = part[np.isfinite(part["objective_mm"])].sort_values("value")
+        off = [
+            one - CROSSOVER[round(10 * value) - 1]
+            for value, one in zip(part["value"], part["objective_mm"], strict=True)
+        ]
+        distances[seed] = np.sqrt(np.mean([(one - np.mean(off)) ** 2 for one in off]))
+    nearest = min(distances, key=distances.get)
+    row = match(frame).iloc[0]
+    assert row["nearest_seed"] == nearest and row["nearest_seed_mm"] == pytest.approx(distances[nearest])
+    here, spread = _sweep(frame, "matlab_gaussian")
+    assert list(here) == [f"P_c={k / 10:.1f}" for k in range(1, 11)]
+    at = frame[frame["value"] == 0.8]
+    assert here["P_c=0.8"] == at.set_index("seed").loc[nearest, "objective_mm"]
+    assert spread["P_c=0.8"] == pytest.approx(np.quantile(at["objective_mm"], [0.5, 0.05, 0.95]))
+    assert _sweep(frame, "pygad") == ({}, {})

@@ -7,18 +7,21 @@ SWEEP_RUNS = ["sweep_runs", "sweep_history", "sweep_parameters"]
 SWEEP_TABLES = [*SWEEP_RUNS, "sweep_effect", "sweep_pairs", "sweep_match"]
 # operators/parameter/population
 SWEEPS = paper_a_settings.sweeps(config["sweep"], SWEPT)
-REDRAW_TABLES = ["redraws", "redraw_counts", "twin_numbers"]
+REDRAW_TABLES = ["redraws", "redraw_counts", "redraw_errors", "twin_numbers"]
 REPRODUCED = config["reproduce"]["campaign"]
-_SWEEP_SHOWN = ["sweep_runs", "sweep_effect", "sweep_pairs", "calibrations"]
+_SWEEP_SHOWN = ["sweep_runs", "sweep_effect", "sweep_pairs", "sweep_match", "calibrations"]
 _PAPER_A = "rrru.studies.rrru3.figures"
 PAPER_A_FIGURES = {
     "fig06": (f"{_PAPER_A}.sweep:fig06", _SWEEP_SHOWN),
     "fig07": (f"{_PAPER_A}.sweep:fig07", _SWEEP_SHOWN),
-    "fig09": (f"{_PAPER_A}.lines:fig09", ["measurements", "errors"]),
-    "fig10": (f"{_PAPER_A}.lines:fig10", ["measurements", "errors"]),
-    "fig11": (f"{_PAPER_A}.spiral:fig11", ["measurements", "errors"]),
-    "fig12": (f"{_PAPER_A}.lines:fig12", ["measurements", "errors"]),
+    "fig09": (f"{_PAPER_A}.lines:fig09", ["measurements", "errors", "redraw_errors"]),
+    "fig10": (f"{_PAPER_A}.lines:fig10", ["measurements", "errors", "redraw_errors"]),
+    "fig11": (f"{_PAPER_A}.spiral:fig11", ["measurements", "errors", "redraw_errors"]),
+    "fig12": (f"{_PAPER_A}.lines:fig12", ["measurements", "errors", "redraw_errors"]),
 }
+TWIN_FIGURES = {"twin_search": (f"{_PAPER_A}.twin:twin_search", ["twin_progress", "twin_restarts"])}
+TRADEOFF_FIGURES = {"twin_tradeoff": (f"{_PAPER_A}.twin:twin_tradeoff", ["twin_tradeoff"])}
+FIGURES |= {"twin": TWIN_FIGURES, "tradeoff": TRADEOFF_FIGURES}
 PAPERS["A"] = {
     "study": "rrru.studies.rrru3",
     "tables": ["errors", "calibrations", "parameters", "genetic", "genetic_parameters", "sweep_runs", "redraw_counts"],
@@ -27,10 +30,22 @@ PAPERS["A"] = {
         "virtual": paper_a_settings.design(parts.virtual(config, REPRODUCED)),
         **reads(
             *(f"genetic.{key}" for key in ("operators", "crossover_fraction", "migration_fraction", "populations")),
-            *(f"reproduce.{key}" for key in config["reproduce"] if key not in ("redraws", "sets")),
+            *(f"reproduce.{key}" for key in config["reproduce"] if key not in ("redraws", "ranked", "sets")),
         ),
     },
 }
+
+
+def _redraw_settings(count):
+    """Settings of a job about draws of the reproduced campaign; count: the key of `reproduce` with their number."""
+    chosen = {config["reproduce"][key] for key in ("line_calibration", "spiral_calibration")}
+    keys = ("line_calibration", "spiral_calibration", "method", count)
+    return {
+        "nominal": parts.nominal(config, REPRODUCED),
+        "virtual": parts.virtual(config, REPRODUCED),
+        "sets": {name: patterns for name, patterns in parts.sets(config, REPRODUCED).items() if name in chosen},
+        **reads("calibration.use_near_singularity", *(f"reproduce.{key}" for key in keys)),
+    }
 
 
 # all values and seeds of one swept setting in one interpretation of the paper
@@ -80,25 +95,29 @@ rule redraws:
     log:
         f"{RESULTS}/logs/redraws.log",
     params:
-        settings={
-            "nominal": parts.nominal(config, REPRODUCED),
-            "virtual": parts.virtual(config, REPRODUCED),
-            "sets": {
-                config["reproduce"][key]: parts.sets(config, REPRODUCED)[config["reproduce"][key]]
-                for key in ("line_calibration", "spiral_calibration")
-            },
-            **reads(
-                "calibration.use_near_singularity",
-                *(f"reproduce.{key}" for key in config["reproduce"] if key not in ("campaign", "sets")),
-            ),
-        },
+        settings=_redraw_settings("redraws"),
         code=code("redraws"),
     script:
         "../../scripts/redraws.py"
 
 
-rule twin:
+# which of many draws is nearest to what the paper prints: `draw` of the reproduced campaign
+rule draw_ranks:
     output:
+        **named(["draw_ranks"]),
+    log:
+        f"{RESULTS}/logs/draw_ranks.log",
+    params:
+        settings=_redraw_settings("ranked"),
+        code=code("draw_ranks"),
+    script:
+        "../../scripts/draw_ranks.py"
+
+
+# an interrupted search goes on from its state
+rule twin_search:
+    output:
+        **named(["twin_restarts", "twin_progress"]),
         twin=f"{RESULTS}/twin/twin.yaml",
     log:
         f"{RESULTS}/logs/twin.log",
@@ -108,11 +127,57 @@ rule twin:
             "nominal": parts.nominal(config, REPRODUCED),
             "virtual": parts.virtual(config, REPRODUCED),
             "workers": 2,
+            "state": f"{RESULTS}/twin/state.json",
             **reads("reproduce.line_calibration", "twin"),
         },
         code=code("twin"),
     script:
         "../../scripts/twin.py"
+
+
+rule twin_hypotheses:
+    output:
+        **named(["twin_hypotheses"]),
+    log:
+        f"{RESULTS}/logs/twin_hypotheses.log",
+    threads: 2
+    params:
+        settings={
+            "nominal": parts.nominal(config, REPRODUCED),
+            "virtual": parts.virtual(config, REPRODUCED),
+            "workers": 2,
+            "state": f"{RESULTS}/twin/hypotheses",
+            **reads("twin"),
+        },
+        code=code("twin_hypotheses"),
+    script:
+        "../../scripts/twin_hypotheses.py"
+
+
+rule twin_tradeoff:
+    output:
+        **named(["twin_tradeoff"]),
+    log:
+        f"{RESULTS}/logs/twin_tradeoff.log",
+    threads: 2
+    params:
+        settings={
+            "nominal": parts.nominal(config, REPRODUCED),
+            "virtual": parts.virtual(config, REPRODUCED),
+            "workers": 2,
+            "state": f"{RESULTS}/twin/tradeoff",
+            **reads("reproduce.line_calibration", "twin"),
+        },
+        code=code("twin_tradeoff"),
+    script:
+        "../../scripts/twin_tradeoff.py"
+
+
+# the search and its figure; not part of the default run
+rule twin:
+    input:
+        rules.twin_search.output,
+        drawn(TWIN_FIGURES).values(),
 
 
 rule paper_a_figures:

@@ -11,9 +11,9 @@ _PATTERN = "line_*"
 @style.printed
 def fig09(tables, options):
     """Group 1 before and after the line calibration (paper A, Fig. 9). (a) Commanded and attained points in the
-    vertical plane, deviations magnified as stated. (b) Size of the error at every point. Grey: points near a
-    constraint singularity. Where a trajectory was passed more than once, curves are means over the passes, bands
-    their range.
+    vertical plane, deviations magnified as stated. (b) Size of the error at every point. Light bands: the middle 90 %
+    of other draws. Grey: points near a constraint singularity. Where a trajectory was passed more than once, curves are
+    means over the passes, darker bands their range.
     """
     name = choose.trajectories(tables["measurements"], _PATTERN, "fig09")[0]
     places = choose.stations(tables["measurements"], name)
@@ -36,8 +36,9 @@ def fig09(tables, options):
 @style.printed
 def fig10(tables, options):
     """Every line before and after the line calibration (paper A, Fig. 10). (a) The lines in the middle, (b) the
-    outer ones. The numbers are the smallest and largest error. Grey: points near a constraint singularity. Where a
-    trajectory was passed more than once, curves are means over the passes, bands their range.
+    outer ones. The numbers are the smallest and largest error. Light bands: the middle 90 % of other draws. Grey:
+    points near a constraint singularity. Where a trajectory was passed more than once, curves are means over the
+    passes, darker bands their range.
     """
     curves = panels.before_and_after(tables, options, "fig10")
     names = choose.trajectories(tables["measurements"], _PATTERN, "fig10")
@@ -60,8 +61,9 @@ def fig10(tables, options):
 @style.printed
 def fig12(tables, options):
     """The lines except the first after the line and the spiral calibration (paper A, Fig. 12). The numbers are the
-    smallest and largest error. Grey: points near a constraint singularity. Where a trajectory was passed more than
-    once, curves are means over the passes, bands their range.
+    smallest and largest error. Light bands: the middle 90 % of other draws. Grey: points near a constraint
+    singularity. Where a trajectory was passed more than once, curves are means over the passes, darker bands their
+    range.
     """
     curves = panels.both_calibrations(tables, options, "fig12")
     names = choose.trajectories(tables["measurements"], _PATTERN, "fig12")

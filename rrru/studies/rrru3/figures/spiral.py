@@ -13,8 +13,9 @@ _COLUMNS = [f"error_{axis}_mm" for axis in _AXES]
 @style.printed
 def fig11(tables, options):
     """The spiral after both calibrations (paper A, Fig. 11). (a) Commanded and attained path, deviations magnified
-    as stated. (b) to (d) Errors along the axes, with the tolerance of the task. Grey: points near a constraint
-    singularity. Where a trajectory was passed more than once, curves are means over the passes, bands their range.
+    as stated. (b) to (d) Errors along the axes, with the tolerance of the task. Light bands: the middle 90 % of other
+    draws. Grey: points near a constraint singularity. Where a trajectory was passed more than once, curves are means
+    over the passes, darker bands their range.
     """
     name = choose.trajectories(tables["measurements"], "*spiral*", "fig11")[0]
     places = choose.stations(tables["measurements"], name)
