@@ -15,7 +15,7 @@ from rrru.campaign.ingest.frames import Frames
 from rrru.campaign.ingest.gross_advice import place_words
 from rrru.campaign.ingest.orientations import other_readings
 from rrru.campaign.ingest.sheet import MEASURED, TURNS, position_text
-from rrru.campaign.ingest.zero_offsets import LOST, found_zeros
+from rrru.campaign.ingest.zero_offsets import LARGE, LOST, found_zeros
 from rrru.campaign.target_registration import axes_by_turning
 from rrru.kinematics.readings import Readings
 
@@ -30,6 +30,8 @@ _AS_GOOD, _FAR_BETTER = 2.0, 0.5
 _GROSS_SHARE = 0.01
 # cosine from which on an axis is one of the body's
 _ALONG = 0.9999
+# poses at which a zero offset moves the platform alike, and the share of the move that may differ by rounding
+_SOME_POSES, _ALIKE = 6, 1e-6
 # rows from which lost zero offsets are estimated; the calibration fits the result to all of them
 _MAX_ROWS = 200
 # ASSUME no platform is off by more than this where the file's frame is the robot's
@@ -101,7 +103,10 @@ def mounting(sheet):
     if registered and free.all() and np.ptp(poses.turn, axis=0).max() < _NEVER_TURNS:
         # for a platform that never turns they are confounded with the frame's shift: their mean is set to the tool
         place = place + np.asarray(sheet.mechanism.tool_mm) - np.unique(place, axis=0).mean(axis=0)
-    turn, notes = np.eye(3), notes + (_found(sheet, frames, place, _precision(frames, poses, left_mm)) if named else ())
+    turn = np.eye(3)
+    if named and not set(frames.names) <= set(sheet.spec.targets):
+        by_zeros = [] if (frames.known & frames.framing).any() else _by_zeros(sheet, poses, command)
+        notes += _found(sheet, frames, place, (*_precision(frames, poses, left_mm), by_zeros))
     if turned:
         turn = _between(poses, rows.turns(frame, "measured"), rotation)
         _refuse_scattered(sheet, poses, rotation)
@@ -271,8 +276,8 @@ def _known(sheet, names):
 
 
 def _found(sheet, frames, place, precision):
-    """Notes on the places (n, 3) that were found; precision: see `_precision`."""
-    (axes, errors), result = precision, []
+    """Notes on the places (n, 3) that were found; precision: of `_precision`, and of `_by_zeros`."""
+    (axes, errors, by_zeros), result = precision, []
     for name in dict.fromkeys(frames.names.tolist()):
         if name in sheet.spec.targets:
             continue
@@ -283,7 +288,10 @@ def _found(sheet, frames, place, precision):
             at = f"reflector {name} assumed at {position_text(place[k])} on the platform, the mean of all at the tool"
             result.append(f"{at}: a platform that never turns does not determine it")
         else:
-            result.append(f"reflector {name} found {_place_text(place[k], axes, errors)}")
+            known = np.isfinite(errors)
+            moves = [axes[:, known].T @ own @ np.append(place[k], 1.0) for own in by_zeros]
+            about = float(np.linalg.norm([errors[known].max(), *np.ravel(moves)]))
+            result.append(f"reflector {name} found {_place_text(place[k], axes[:, ~known].T, about)}")
     return tuple(result)
 
 
@@ -300,12 +308,35 @@ def _precision(frames, poses, residual):
         return axes, np.where(turned > 0.0, residual / turned, np.inf)
 
 
-def _place_text(place, axes, errors):
-    """A place (3,) on the platform in words, with a question mark for a number that the readings do not determine."""
-    still = axes[:, ~np.isfinite(errors)].T
+def _by_zeros(sheet, poses, command):
+    """Matrices (3, 4) from places (x, y, z, 1) to what an ordinary zero offset moves them by, of drives that allow it.
+
+    A zero offset of the last drive of a chain moves the platform alike in all poses. No reading tells it from the
+    reflectors' places.
+    """
+    some = np.flatnonzero(poses.closed)
+    some = some[np.linspace(0, len(some) - 1, min(_SOME_POSES, len(some))).astype(int)]
+    drive, back, result = sheet.actuators(command)[some], poses.turn[some].transpose(0, 2, 1), []
+    origin = poses.point(np.zeros(3))[some]
+    for k, part in enumerate(sheet.mechanism.parts.drives):
+        moved = sheet.mechanism.solve(drive + LARGE[part.unit] * np.eye(drive.shape[1])[k], command[some])
+        turn, shift = back @ moved.turn, (back @ (moved.point(np.zeros(3)) - origin)[:, :, None])
+        move = np.concatenate([turn - np.eye(3), shift], axis=2)
+        size = np.abs(move[:, :, :3]).max() * sheet.mechanism.size_mm + np.abs(shift).max()
+        apart = np.ptp(move[:, :, :3], axis=0).max() * sheet.mechanism.size_mm + np.ptp(shift, axis=0).max()
+        if moved.closed.all() and apart < _ALIKE * size:
+            result.append(move[0])
+    return result
+
+
+def _place_text(place, still, about):
+    """A place (3,) on the platform in words, with a question mark for a number that the readings do not determine.
+
+    still (k, 3): axes along which they do not; about: error in mm along the others.
+    """
     of_body = {int(np.abs(axis).argmax()) for axis in still if np.abs(axis).max() > _ALONG}
     numbers = ("?" if k in of_body else f"{value:.6g}" for k, value in enumerate(place))
-    result = f"at ({', '.join(numbers)}) mm on the platform, to about {errors[np.isfinite(errors)].max():.2g} mm"
+    result = f"at ({', '.join(numbers)}) mm on the platform, to about {about:.2g} mm"
     for axis in still:
         largest = int(np.abs(axis).argmax())
         along = "xyz"[largest] if largest in of_body else f"({', '.join(f'{value:.3g}' for value in axis)})"

@@ -358,6 +358,26 @@ def test_a_place_is_stated_as_far_as_the_readings_determine_it(tmp_path, seed):
     assert off < 3.0 * float(numbers[4]) < 10.0
 
 
+def test_the_zero_of_the_last_drive_is_in_the_precision_of_a_place(tmp_path):
+    """A zero offset of the axis that carries the platform turns all reflectors about it: nothing else is wrong here."""
+    generator = np.random.default_rng(7)
+    links = ({"a_mm": 325.0, "range_deg": [-120, 120]}, {"a_mm": 225.0, "alpha_deg": 90, "range_deg": [-130, 130]})
+    wrist = ({"a_mm": 60.0, "alpha_deg": -90, "range_deg": [-100, 100]}, {"range_deg": [-170, 170]})
+    robot = from_dh([*links, *wrist], name="arm")
+    low, high = robot.drive_range.T
+    driven = low + (high - low) * generator.random((60, 4))
+    places = {"one": (40.0, 10.0, -35.0), "two": (-60.0, 25.0, -80.0)}
+    table = _seen_by_a_tracker(robot, driven, places, {"dq4": 4e-3}, generator)
+    for note in _taken(tmp_path, table, robot, frame="register").notes:
+        if found := re.fullmatch(
+            r"reflector (\w+) found at \((.*), (.*), (.*)\) mm on the platform, to about (.*) mm", note
+        ):
+            place, about = np.array(found.groups()[1:4], dtype=float), float(found[5])
+            off = np.linalg.norm(place - places.pop(found[1]))
+            assert 4e-3 * 30.0 < off < about < 2.0
+    assert not places
+
+
 def test_the_place_on_a_platform_that_never_turns_is_an_assumption(tmp_path):
     robot, generator = Rrru3(), np.random.default_rng(1)
     driven = robot.inverse(generator.uniform((-150.0, -150.0, 550.0), (150.0, 150.0, 700.0), (40, 3)))
