@@ -156,3 +156,11 @@ def _estimate(side, calibration):
         matrix.loc[first, second] = matrix.loc[second, first] = value
     error = values["standard_error"].where(values["seen"] & ~values["at_bound"]).to_numpy()
     return values, matrix.to_numpy() * np.outer(error, error)
+
+
+def over_runs(values, runs):
+    """Mean of values (n,) and its standard error, with runs as independent units; 0 where there is one run."""
+    by_run = values.groupby(runs).agg(["mean", "size"])
+    mean, weight, count = values.mean(), by_run["size"] / len(values), len(by_run)
+    square = (weight**2 * (by_run["mean"] - mean) ** 2).sum() * count / max(count - 1, 1)
+    return float(mean), float(np.sqrt(square))

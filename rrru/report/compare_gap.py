@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 from scipy.stats import norm
 
-from rrru.report.compare_unseen import over_runs
+from rrru.report.compare import over_runs
 
 _PARTS = ("effect", "scatter", "runs", "unexplained")
 
@@ -26,17 +26,17 @@ def gap_difference(first, second):
     squares = [_square(side) for side in (first, second)]
     apart = squares[1][0] - squares[0][0]
     error = float(np.hypot(squares[0][1], squares[1][1]))
-    names = dict.fromkeys(part["part"] for side in (first, second) for part in _parts(side))
-    listed = [{part["part"]: part for part in _parts(side)} for side in (first, second)]
+    names = dict.fromkeys(part["part"] for side in (first, second) for part in _sized_parts(side))
+    listed = [{part["part"]: part for part in _sized_parts(side)} for side in (first, second)]
     rows = [
-        _row(name, *(_interval(side, part.get(name)) for side, part in zip((first, second), listed, strict=True)))
+        _part_row(name, *(_interval(side, part.get(name)) for side, part in zip((first, second), listed, strict=True)))
         for name in names
     ]
     rows = [row for row in rows if row["a_rms_mm"] > 0.0 or row["b_rms_mm"] > 0.0]
     return GapDifference(pd.DataFrame(rows), float(2.0 * norm.sf(abs(apart) / error)) if error > 0.0 else 1.0)
 
 
-def _parts(side):
+def _sized_parts(side):
     """Parts of the budget that are sizes."""
     return [part for part in side.verdict["budget"] if part["kind"] in _PARTS]
 
@@ -58,7 +58,7 @@ def _interval(side, part):
     return part["rms_mm"], *(float(np.sqrt(max(part[end], 0.0) * whole)) for end in ("share_low", "share_high"))
 
 
-def _row(name, first, second):
+def _part_row(name, first, second):
     """A row of both sides' sizes and intervals."""
     row = {"part": name}
     for side, (size, low, high) in zip("ab", (first, second), strict=True):
