@@ -9,8 +9,7 @@ own scale (Hampel, Journal of the American Statistical Association 69, 1974). Th
 - residuals of a fit in no order: the model, and the median of the nearest places
   (`rrru.calibration.lengths.standing_out`);
 - before a model is fitted: curves through the neighbours and running medians, since readings hold all errors of the
-  robot, which bend, jump and ripple (`rrru.campaign.ingest.outliers`), or the usual distance of two reflectors
-  (`rrru.campaign.ingest.bodies`).
+  robot, which bend, jump and ripple, or the usual distance of two reflectors (both `rrru.campaign.ingest.outliers`).
 """
 
 import numpy as np

@@ -23,14 +23,13 @@ from rrru.diagnosis.inference import (
     with_effects,
     with_world_scale,
 )
-from rrru.diagnosis.left_out import left_out, left_out_note
 from rrru.diagnosis.make_problem import make_case
 from rrru.diagnosis.model_space import explore
-from rrru.diagnosis.omitted_variable_bias import bias_notes
 from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.posterior import Posterior
 from rrru.diagnosis.remainder import NO_REMAINDER, followed_alike, remainder_rows
 from rrru.diagnosis.result_notes import (
+    bias_notes,
     fit_notes,
     mass_notes,
     noise_notes,
@@ -39,13 +38,12 @@ from rrru.diagnosis.result_notes import (
     undetermined_payload_notes,
     zero_notes,
 )
-from rrru.diagnosis.result_tables import details_of, parameter_rows, where
+from rrru.diagnosis.result_tables import details_of, left_out, left_out_note, parameter_rows, where
 from rrru.diagnosis.settings import GapSettings, Prior
 from rrru.diagnosis.shrink import CLOSED, order_by_share, share_closed, shrink_steps
 from rrru.diagnosis.state import State
-from rrru.diagnosis.validity import why_no_answer
 from rrru.diagnosis.variance_by_factor import worst_spot
-from rrru.diagnosis.verdict import Verdict, decide, without_answer
+from rrru.diagnosis.verdict import Verdict, decide, why_no_answer, without_answer
 from rrru.errors import ConfigError
 from rrru.estimation.noise_model import CONTRADICTED, NoiseModel
 from rrru.kinematics.dynamics import Masses

@@ -29,8 +29,7 @@ import numpy as np
 
 from rrru.cache import Latest
 from rrru.diagnosis.evidence_kernels import log_sum_exp
-from rrru.diagnosis.marginal import Average
-from rrru.diagnosis.marginal_problem import MarginalProblem, Prior
+from rrru.diagnosis.marginal_problem import Average, MarginalProblem, Prior
 from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.payload_nuisance import (
     WEIGHT,

@@ -10,9 +10,8 @@ from rrru.campaign.outliers import isolated
 from rrru.diagnosis.calibrate import calibrate, origin
 from rrru.diagnosis.detectability import with_seen
 from rrru.diagnosis.discrepancy_basis import UNKNOWN
-from rrru.diagnosis.drive_spectra import with_spectra
+from rrru.diagnosis.drive_spectra import with_orders, with_spectra
 from rrru.diagnosis.evidence import ModelEvidence
-from rrru.diagnosis.harmonic_orders import with_orders
 from rrru.diagnosis.heldout import HeldOut
 from rrru.diagnosis.hypothesis import Hypothesis
 from rrru.diagnosis.model_fit import EffectModel, ModelFit, fit_model
@@ -139,7 +138,7 @@ def _leaves_enough(linear, columns):
 
 
 def _is_searched(coordinates, shape):
-    """Whether a shape of an effect was found in these data, see `rrru.diagnosis.harmonic_orders`."""
+    """Whether a shape of an effect was found in these data, see `rrru.diagnosis.drive_spectra`."""
     return coordinates.searched is not None and 0 < coordinates.stated <= shape
 
 

@@ -19,13 +19,12 @@ from rrru.campaign.driven_path import (
     stops,
 )
 from rrru.campaign.stated_motion import stated_motion
-from rrru.diagnosis.approach_direction import at_reversals, rest_widths
+from rrru.diagnosis.approach_direction import at_reversals, paths_between_stops, rest_widths, undetermined_senses
 from rrru.diagnosis.discrepancy_basis import unknown_functions
 from rrru.diagnosis.drive_spectra import resolved
 from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.payload_nuisance import nuisance_priors
 from rrru.diagnosis.problem import Case
-from rrru.diagnosis.stop_paths import paths_between_stops, undetermined_senses
 from rrru.effects.motion import Course, make_motion
 from rrru.effects.protocol import LOADS, PATH, complete_rows, known_values
 from rrru.errors import FitError

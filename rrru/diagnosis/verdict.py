@@ -8,11 +8,17 @@ A decision is not a probability. A cause is named where its posterior probabilit
 causes that do. Confounded causes form a group where none is that probable alone, but one of them acts with that
 probability. They exclude each other, since each explains what the others would. The most probable one represents the
 group wherever a model is needed.
+
+No cause is named where the best answer does not describe its readings at all. Lengths in mm, angles in rad.
 """
 
 from dataclasses import dataclass
 
+import numpy as np
+
+from rrru.campaign.noise import repeat_noise
 from rrru.diagnosis.options import OPTIONS
+from rrru.diagnosis.problem import GEOMETRY
 from rrru.diagnosis.terms import per_leg
 
 _NONE = (frozenset(), False)
@@ -76,7 +82,7 @@ class Verdict:
 
 
 def without_answer(why):
-    """The Verdict on a fit that describes its readings too badly for any answer, see `rrru.diagnosis.validity`."""
+    """The Verdict on a fit that describes its readings too badly for any answer, see `why_no_answer`."""
     return Verdict((), True, 1.0, 0, (), (), (), why)
 
 
@@ -176,3 +182,39 @@ def _leg(posterior, effects, library):
     best = {max(legs, key=legs.get) for legs in likely if legs}
     leg = best.pop() if len(best) == 1 else 0
     return leg if isinstance(leg, int) else 0
+
+
+def why_no_answer(inference, stated_mm=None):
+    """Why no cause can be named, in words; empty where the fit of the best answer may be read.
+
+    A fit whose geometric errors end at their bounds has its minimum outside of all plausible robots. A fit with
+    residuals of many times the noise has a model of another robot, or readings of another campaign. stated_mm: noise
+    per axis, None where it is not stated.
+    """
+    return "; ".join(filter(None, (_at_bounds(inference), _far_off(inference, stated_mm))))
+
+
+def _at_bounds(inference):
+    """Which geometric errors end at bounds, in words; empty where none."""
+    estimate, parameters = inference.fit.estimate, inference.case.mechanism.parameters
+    held = np.flatnonzero(estimate.at_bound[estimate.parameters.places[GEOMETRY]])
+    if not len(held):
+        return ""
+    values = estimate.block(GEOMETRY)
+    shown = [
+        f"{parameters.names[k]} = {values[k]:.3g} {parameters.units[k]}" for k in held[: OPTIONS.max_listed_numbers]
+    ]
+    more = f" and {len(held) - len(shown)} more" if len(held) > len(shown) else ""
+    return f"the fit ends at bounds of calibration parameters ({', '.join(shown)}{more})"
+
+
+def _far_off(inference, stated_mm):
+    """How far the best answer is from the readings, in words; empty where that is less than many times the noise."""
+    case = inference.case
+    left = float(np.sqrt((case.residual(inference.state) ** 2).sum(axis=1).mean()))
+    repeated, count = repeat_noise(case.measurements[case.used])
+    axis_mm = max(stated_mm or case.noise_mm, repeated if count else 0.0)
+    noise = float(np.sqrt(3.0) * axis_mm)
+    if left <= OPTIONS.max_left_per_noise * noise:
+        return ""
+    return f"the residual of the best answer is {left:.3g} mm rms, {left / noise:.0f} times the noise of {noise:.2g} mm"

@@ -17,7 +17,7 @@ In robots with drives of both kinds it acts at those that turn.
 
 Assumptions: one harmonic, the same ratio in all drives; the error depends on the angle only, not on load or direction
 of motion. The ratio is a number of the drive's data sheet. Where it is not stated, it is searched in addition to the
-default, see `rrru.diagnosis.harmonic_orders`. With N = 50 the error repeats every 7.2 degrees of the arm; a campaign
+default, see `rrru.diagnosis.drive_spectra`. With N = 50 the error repeats every 7.2 degrees of the arm; a campaign
 must sample more densely than every 3.6 degrees, or the error is aliased.
 
 Source: Litvin and Fuentes, Gear Geometry and Applied Theory, 2004, on functions of transmission errors; the ratio of 50

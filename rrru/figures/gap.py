@@ -1,14 +1,20 @@
-"""The diagnosis of one campaign's gap on one page: where it is largest, what causes it, and how far it shrinks."""
+"""The diagnosis of one campaign's gap on one page: where it is largest, what causes it, and how far it shrinks.
+
+Its maps show the gap as arrows over the workspace, a top view and a side view below it. Its budget is one stacked bar
+with the intervals of its parts.
+"""
 
 import re
 from textwrap import wrap
 
 import numpy as np
+from matplotlib import colormaps
+from matplotlib.colors import ListedColormap, Normalize
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
 from rrru.errors import ConfigError
-from rrru.figures import choose, gap_arrows, gap_budget, style
+from rrru.figures import choose, style
 
 _BEFORE = {"color": "#777777", "marker": "o", "markerfacecolor": "white"}
 _AFTER = {"color": style.BLUE, "marker": "s"}
@@ -35,6 +41,28 @@ _KINDS = {"held_out": "held-out", "resimulated": "resimulated"}
 # replaces a space at which no line may end
 _JOINT = "\N{NO-BREAK SPACE}"
 
+# axes of each view
+_VIEWS = {"top view": ("x", "y"), "side view": ("x", "z")}
+# more arrows than this hide each other
+_MOST_ARROWS = 400
+# the largest arrow over the width of the view, and the size that the scale holds; single larger ones may stand out
+_ARROW_SHARE, _LARGEST_PERCENT = 0.08, 99.0
+_MARGIN = 0.03
+# points of a path are nearer to each other than this share of the workspace
+_PATH_SHARE = 0.2
+_ARROW = {"width": 0.0035, "headwidth": 3.5, "headlength": 4.0, "headaxislength": 3.5}
+_RING = {"color": style.VERMILION, "marker": "o", "markersize": 9.0, "markerfacecolor": "none", "markeredgewidth": 1.4}
+
+# parts of the budget by kind
+_KIND_COLOURS = {"scatter": "#aaaaaa", "runs": "#cccccc", "unexplained": "#d55e00", "calibration": "#eeeeee"}
+# what completes the parts to the whole: products of two of them, and what the draw of the noise leaves
+_RESTS = {"covariance": "/////", "sampling": "....."}
+_EFFECT_COLOURS = (style.BLUE, "#56b4e9", "#009e73", "#cc79a7", "#f0e442", "#0072b2")
+# parts of a smaller share are not drawn, or not named; names stand inside of parts wider than this for each letter
+_LEAST_PART, _NAMED_PART, _LETTER_SHARE = 0.01, 0.03, 0.0125
+# of names above and below the bar
+_NAME_HEIGHTS = (0.34, -0.36)
+
 
 @style.printed
 def gap(tables, options):
@@ -56,12 +84,12 @@ def gap(tables, options):
     used = points[points["used"]]
     figure, panels = _page(sum(map(len, headline)), len(causes), shrink["trajectory"].nunique(), used)
     _write(panels["headline"], headline)
-    gap_budget.draw(panels["budget"], frames["gap_budget"])
+    draw_budget(panels["budget"], frames["gap_budget"])
     _map(figure, panels, used, verdict, options["z_down"], "(a) ")
     _causes(panels["causes"], causes, verdict, words)
     _shrink(panels["shrink"], shrink, verdict)
     _along(panels["along"], points, verdict)
-    gap_arrows.fit(figure, panels, used)
+    _fit_views(figure, panels, used)
     return figure
 
 
@@ -75,20 +103,20 @@ def gap_map(tables, options):
     verdict = choose.of_campaign(tables, "gap_verdicts", campaign, "gap_map").iloc[0]
     points = _sized(tables["gap_points"], campaign)
     used = points[points["used"]]
-    heights = [_MAP_MM * gap_arrows.height_ratio(used, name) for name in gap_arrows.VIEWS]
+    heights = [_MAP_MM * _height_ratio(used, name) for name in _VIEWS]
     figure = style.new(style.SINGLE_MM, sum(heights) + 36.0)
     axes = figure.subplots(2, 1, height_ratios=heights)
-    panels = dict(zip(gap_arrows.VIEWS, axes, strict=True))
+    panels = dict(zip(_VIEWS, axes, strict=True))
     axes[0].sharex(axes[1])
     _map(figure, panels, used, verdict, options["z_down"])
-    gap_arrows.fit(figure, panels, used)
+    _fit_views(figure, panels, used)
     return figure
 
 
 def _map(figure, panels, used, verdict, z_down, mark=""):
     """Both views of the gap with the scale of their arrows."""
     worst = verdict[[f"worst_{axis}_mm" for axis in "xyz"]].to_numpy(dtype=float)
-    arrows, beyond, factor = gap_arrows.draw(panels, used, worst, z_down)
+    arrows, beyond, factor = _draw_arrows(panels, used, worst, z_down)
     panels["top view"].set_title(f"{mark}gap, magnified {factor:g} times; ring: worst region")
     place = {"location": "bottom", "aspect": 40, "fraction": 0.08, "extend": "max" if beyond else "neither"}
     bar = figure.colorbar(arrows, ax=panels["side view"], ticks=MaxNLocator(_TICKS), **place)
@@ -108,7 +136,7 @@ def _sized(points, campaign):
 def _page(lines, causes, trajectories, used):
     """A figure that is as high as its panels need, and these by name, empty."""
     rows = [_ROW_MM * causes, _ROW_MM * trajectories]
-    views = [_MAP_MM * gap_arrows.height_ratio(used, name) for name in gap_arrows.VIEWS]
+    views = [_MAP_MM * _height_ratio(used, name) for name in _VIEWS]
     # labels around the panels count in the figure's height, not in the ratios of the panels
     middle, others = max(sum(rows) + 30.0, sum(views) + 36.0), (_LINE_MM * lines, _BUDGET_MM, 46.0, 4.0)
     heights = [*others[:2], min(middle, _MOST_MM - sum(others)), others[2]]
@@ -116,7 +144,7 @@ def _page(lines, causes, trajectories, used):
     outer = figure.add_gridspec(4, 1, height_ratios=heights)
     sides = outer[2].subgridspec(1, 2, width_ratios=[1.0, 1.0])
     left, right = (side.subgridspec(2, 1, height_ratios=size) for side, size in zip(sides, (views, rows), strict=True))
-    names = ("headline", "budget", *gap_arrows.VIEWS, "causes", "shrink", "along")
+    names = ("headline", "budget", *_VIEWS, "causes", "shrink", "along")
     places = (outer[0], outer[1], *left, *right, outer[3])
     panels = {name: figure.add_subplot(place) for name, place in zip(names, places, strict=True)}
     panels["top view"].sharex(panels["side view"])
@@ -284,3 +312,156 @@ def _share(row, words=""):
     if not np.isfinite(shares).all():
         return f"{value} %{words}"
     return f"{value} %{words} ({'95 %: ' if words else ''}{low} to {high})"
+
+
+def _shades():
+    """Colours of the arrows: viridis without its light end, dark for large gaps."""
+    return ListedColormap(colormaps[style.MEASURE](np.linspace(0.85, 0.0, 256)))
+
+
+def _height_ratio(points, view):
+    """Height over width of a view."""
+    low, high = _limits(points, _VIEWS[view])
+    return max((high[1] - low[1]) / (high[0] - low[0]), 0.3)
+
+
+def _draw_arrows(panels, points, worst, z_down=True):
+    """Draw both views into axes by name.
+
+    Returns the arrows, whether some are larger than the scale holds, and how much they are magnified.
+
+    points: rows of gap_points that are used, with `before_mm`; worst (3,); z_down: the robot frame's z points down.
+    """
+    size = points["before_mm"].to_numpy()
+    scale = Normalize(0.0, max(np.percentile(size, _LARGEST_PERCENT), 1e-9) if len(size) else 1.0)
+    span = max(np.ptp(points[f"command_{axis}_mm"]) for axis in "xyz")
+    factor = style.magnification(np.array([scale.vmax]), span, _ARROW_SHARE)
+    shown = _thinned(points)
+    for name, plane in _VIEWS.items():
+        arrows = _view(panels[name], points, shown, plane, scale, factor, z_down)
+        panels[name].plot(*worst[["xyz".index(axis) for axis in plane]], linestyle="none", zorder=6, **_RING)
+    panels["top view"].tick_params(labelbottom=False)
+    panels["side view"].set_xlabel("x (mm)")
+    return arrows, bool((size > scale.vmax * (1.0 + 1e-9)).any()), factor
+
+
+def _fit_views(figure, panels, points):
+    """Widen the views where the page is too low for them, so that both hold all points."""
+    engine, needed = figure.get_layout_engine(), []
+    style.arrange(figure)
+    for name, plane in _VIEWS.items():
+        (low, high), box = _limits(points, plane), panels[name].get_window_extent()
+        needed.append((high[1] - low[1]) / (high[0] - low[0]) * box.width / box.height)
+    widen = max(needed)
+    if widen > 1.0:
+        # other numbers at the axes take other room
+        figure.set_layout_engine(engine)
+        panels["side view"].set_xlim(0.5 * ((high + low)[0] + widen * (high - low)[0] * np.array([-1.0, 1.0])))
+
+
+def _view(axes, points, shown, plane, scale, factor, z_down):
+    """One view: the paths as grey lines, the gap's part in the plane as arrows coloured by its size in space.
+
+    Lines between poses in no order would show nothing and hide the arrows.
+    """
+    across, up = (f"command_{axis}_mm" for axis in plane)
+    span = max(np.ptp(points[f"command_{axis}_mm"]) for axis in "xyz") if len(points) else 0.0
+    for _, run in points.groupby("run", sort=False):
+        place = run[[f"command_{axis}_mm" for axis in "xyz"]].to_numpy(dtype=float)
+        steps = np.linalg.norm(np.diff(place, axis=0), axis=1)
+        if len(steps) and np.median(steps) < _PATH_SHARE * span:
+            axes.plot(run[across], run[up], color="#cccccc", linewidth=0.5, zorder=1)
+    columns = (across, up, *(f"before_{axis}_mm" for axis in plane), "before_mm")
+    size = {"angles": "xy", "scale_units": "xy", "scale": 1.0 / factor, "cmap": _shades(), "norm": scale}
+    arrows = axes.quiver(*shown[list(columns)].to_numpy().T, **size, **_ARROW, zorder=3)
+    low, high = _limits(points, plane)
+    # the views share x, so that what is left of a panel's height widens y
+    axes.update_datalim([low, high])
+    axes.set(xlim=(low[0], high[0]), aspect="equal", adjustable="datalim")
+    if plane[1] == "z":
+        style.height_axis(axes, z_down)
+    else:
+        axes.set_ylabel(f"{plane[1]} (mm)")
+    axes.grid(True)
+    return arrows
+
+
+def _limits(points, plane):
+    """Lower and upper corner (2,) of a view, with a margin for the arrows."""
+    place = points[[f"command_{axis}_mm" for axis in plane]].to_numpy(dtype=float)
+    span = max(np.ptp(points[f"command_{axis}_mm"]) for axis in "xyz") if len(points) else 1.0
+    margin = (_MARGIN + _ARROW_SHARE) * max(span, 1.0)
+    return (place.min(axis=0) - margin, place.max(axis=0) + margin) if len(place) else (np.zeros(2), np.ones(2))
+
+
+def _thinned(points):
+    """Every n-th point of each run, large gaps last so that they lie on top."""
+    step = max(-(-len(points) // _MOST_ARROWS), 1)
+    place = points.groupby("run", sort=False).cumcount()
+    return points[place % step == 0].sort_values("before_mm", kind="stable")
+
+
+def draw_budget(axes, rows):
+    """Parts of `gap_budget` one after the other: effects by share, then what does not repeat, runs and the unknown.
+
+    A thin line in each part is its 95 % interval, counted from the part's beginning. Covariances of parts (hatched) and
+    the sampling of the noise (dotted) complete them to 1; negative ones extend to the left of 0.
+    """
+    shown = rows[(rows["share"] > _LEAST_PART) & ~rows["kind"].isin(["covariance", "sampling"])]
+    effects = shown[shown["kind"] == "effect"].sort_values("share", ascending=False)
+    others = [part for kind in _KIND_COLOURS for part in shown[shown["kind"] == kind].to_dict("records")]
+    rests = rows[rows["kind"].isin([*_RESTS])].groupby("kind")["share"].sum()
+    limits = min(rests[rests < 0.0].sum(), 0.0), max(shown["share"].sum() + rests[rests > 0.0].sum(), 1.0)
+    # where names above and below the bar end so far
+    taken = dict.fromkeys(_NAME_HEIGHTS, limits[0])
+    least = _rests(axes, rests[rests < 0.0], 0.0, limits, taken)
+    start = 0.0
+    for number, part in enumerate([*effects.to_dict("records"), *others]):
+        colour = _KIND_COLOURS.get(part["kind"], _EFFECT_COLOURS[number % len(_EFFECT_COLOURS)])
+        axes.barh(0.0, part["share"], left=start, height=0.6, color=colour, edgecolor="white", linewidth=0.6)
+        low, high = (start + max(part[name], 0.0) for name in ("share_low", "share_high"))
+        # one below the other, where they overlap
+        axes.plot([low, high], [-0.12 - 0.05 * (number % 4)] * 2, color="black", linewidth=0.7, solid_capstyle="butt")
+        text = f"{part['part'].replace('_', ' ')} {100.0 * part['share']:.0f} %"
+        middle = start + 0.5 * part["share"]
+        if part["share"] > _width(text, limits):
+            ink = "white" if colour == style.BLUE else "black"
+            axes.text(middle, 0.1, text, ha="center", va="center", fontsize=7.0, color=ink, in_layout=False)
+        elif part["share"] > _NAMED_PART:
+            _name(axes, text, middle, limits, taken)
+        start += part["share"]
+    most = _rests(axes, rests[rests > 0.0], start, limits, taken)
+    axes.set(xlim=(min(least, 0.0), max(start, most, 1.0)), ylim=(-0.75, 0.75), yticks=[])
+    axes.set(xlabel="share of the gap's mean square", ylabel="budget")
+    for side in ("left", "right", "top"):
+        axes.spines[side].set_visible(False)
+
+
+def _width(text, limits):
+    """Width of a text over a bar between limits, in shares."""
+    return _LETTER_SHARE * len(text) * (limits[1] - limits[0])
+
+
+def _name(axes, text, middle, limits, taken):
+    """Write the name of a part above or below its middle, where no other one is, within the limits of the bar."""
+    width = _width(text, limits)
+    wanted = max(min(middle - 0.5 * width, limits[1] - width), limits[0])
+    height = min(taken, key=lambda one: max(taken[one] - wanted, 0.0))
+    left = max(wanted, taken[height])
+    taken[height] = left + width
+    axes.text(left, height, text, ha="left", va="bottom" if height > 0.0 else "top", fontsize=7.0, in_layout=False)
+
+
+def _rests(axes, shares, start, limits, taken):
+    """Draw covariances and sampling of one sign, shares by kind, as one part each from `start` on; returns the end."""
+    for kind in _RESTS:
+        share = float(shares.get(kind, 0.0))
+        if abs(share) <= _LEAST_PART:
+            continue
+        look = {"facecolor": "white", "edgecolor": "#777777", "hatch": _RESTS[kind], "linewidth": 0.6}
+        axes.barh(0.0, share, left=start, height=0.6, **look)
+        if abs(share) > _NAMED_PART:
+            text = f"{kind} {100.0 * share:.0f} %".replace("-", "\N{MINUS SIGN}")
+            _name(axes, text, start + 0.5 * share, limits, taken)
+        start += share
+    return start

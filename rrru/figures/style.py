@@ -7,8 +7,11 @@ in grey and in marker.
 from contextlib import contextmanager
 from functools import wraps
 from textwrap import fill
+from types import SimpleNamespace
 
 import numpy as np
+from fontTools.ttLib import registerCustomTableClass
+from fontTools.ttLib.tables.otBase import BaseTTXConverter
 from matplotlib import style
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.backends.backend_pdf import FigureCanvasPdf
@@ -16,10 +19,7 @@ from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
-from rrru.figures.fonts import leave_out_layout
 from rrru.store.atomic_write import whole
-
-leave_out_layout()
 
 SINGLE_MM, DOUBLE_MM = 85.0, 175.0
 _MM_PER_INCH = 25.4
@@ -30,6 +30,9 @@ KINDS = {
     "png": (FigureCanvasAgg, "Software", "Description"),
     "svg": (FigureCanvasSVG, "Date", "Description"),
 }
+# tables of kerning and ligatures: a PDF holds text that is laid out already, and a subset of them takes longer than the
+# glyphs themselves
+_LAYOUT_TABLES = ("GDEF", "GPOS", "GSUB")
 # characters in a line of a legend that stands in a panel's place
 _NARROW = 24
 
@@ -70,6 +73,23 @@ _STYLE = {
     # names inside of a file: by what it draws, not by chance
     "svg.hashsalt": "rrru",
 }
+
+
+class UnusedTable(BaseTTXConverter):
+    """A layout table that a subset of its font, embedded in a PDF, goes without."""
+
+    def decompile(self, _data, _font):
+        """Read nothing: fontTools looks at the version and at `LookupList` of every layout table before it prunes."""
+        self.table = SimpleNamespace(Version=0)
+
+    def prune_pre_subset(self, _font, _options):
+        """Whether fontTools keeps the table in a subset: never."""
+        return False
+
+
+# in this process, whatever else writes a PDF
+for _tag in _LAYOUT_TABLES:
+    registerCustomTableClass(_tag, __name__, UnusedTable.__name__)
 
 
 @contextmanager

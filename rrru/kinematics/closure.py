@@ -7,16 +7,20 @@ screws and W_i the wrenches reciprocal to them, W_i S_i = 0, the step obeys
 
 The W_i of legs that share passive joints are blocks of one W (`rrru.kinematics.wrenches`); their equations are added. A
 bar has one wrench, the unit force along its line, and e_i its missing length. More than six wrenches are met by
-least squares. Screws and twists are at the world's origin, the velocity first: (v, w). Lengths in mm, angles in rad.
+least squares. Screws and twists are at the world's origin, the velocity first: (v, w). The compiled iteration of
+`rrru.kinematics.closure_kernel` takes the legs as flat arrays. Lengths in mm, angles in rad.
 """
 
 import numpy as np
 
 from rrru.errors import ConfigError
+from rrru.kinematics import closure_kernel
 from rrru.kinematics.chain import Poses, Twists
 from rrru.kinematics.closure_kernel import ARM_MM
-from rrru.kinematics.closure_tables import closed, tables
 from rrru.kinematics.wrenches import SCALE, by_group, constraints_of, spare_joints, wrenches_of
+
+# a pose with a larger residual is not closed
+_CLOSED_MM = 1e-7
 
 
 class Closure:
@@ -69,3 +73,87 @@ def _inverse(matrices):
         except np.linalg.LinAlgError:
             pass
     return np.linalg.pinv(matrices)
+
+
+def tables(legs, spare):
+    """Arrays of Legs with m joints, q of them passive, counted once per leg that has them; -1 where there is none.
+
+    slots (m + legs, 3): of every joint, and of what follows a leg's last one, the site, the drive and whether a link
+    ends there; frames (m + legs, 4, 3): the placement before it, rows its axes and its place; motions (m + legs, 6):
+    the twist of its motion; ends (legs, 7): a leg's first link, its first of the q, one past its last, whether a bar
+    ends it, the bar's drive and both sites; bars (legs, 4): length and platform point; screws (q, 7): the twists of the
+    passive joints' motions and 1, or 0 for those that keep their value, `spare` their names; values (q,): the number of
+    the value of each; turning (k,): whether the joint of a value turns. Raises ConfigError for a passive joint before a
+    bar.
+    """
+    slots, frames, motions, ends, bars, screws, values = [], [], [], [], [], [], []
+    for number, leg in enumerate(legs.legs):
+        passive, chain = [joint for joint in leg.joints if joint.passive], legs.chains[leg.name]
+        if leg.bar and passive:
+            raise ConfigError(f"{leg.name}: {len(passive)} of the joints before its bar are passive; allowed: none")
+        for joint in leg.joints:
+            drive = -1 if joint.kind == "fixed" or joint.drive is None else joint.drive
+            slots.append((legs.site_numbers[joint.name], drive, joint.passive))
+        slots.append((-1, -1, True))
+        frames += [chain.frames]
+        motions += [chain.motions, np.zeros((1, 6))]
+        first, last = len(screws), len(screws) + len(passive)
+        ends.append((first + number, first, last, *_bar_numbers(legs, leg)))
+        bars.append(np.r_[leg.bar.length_mm, leg.bar.platform_mm] if leg.bar else np.zeros(4))
+        screws += [
+            [*motion, joint.name not in spare]
+            for joint, motion in zip(leg.joints, chain.motions, strict=True)
+            if joint.passive
+        ]
+        values += [legs.passive_numbers[joint.name] for joint in passive]
+    turning = np.array([joint.kind == "R" for joint in legs.passive_joints], dtype=bool)
+    parts = (
+        np.array(slots),
+        np.concatenate(frames),
+        np.concatenate(motions),
+        np.array(ends),
+        np.array(bars),
+        np.reshape(screws, (-1, 7)).astype(float),
+    )
+    return *parts, np.array(values, dtype=np.int64), turning
+
+
+def _bar_numbers(legs, leg):
+    """Of a leg whether a bar ends it, its drive and both its sites."""
+    if not leg.bar:
+        return 0, -1, -1, -1
+    return 1, -1 if leg.bar.drive is None else leg.bar.drive, *(legs.site_numbers[name] for name in leg.bar_sites)
+
+
+def closed(tables, actuators, start, twists, all_met):
+    """The fields of Poses at actuator values (n, K), next to the Poses `start`; NaN where Newton does not converge.
+
+    twists: Twists at n points or one; all_met: whether all constraints can be met, not only by least squares. The
+    residual is inf where actuator values or start are unknown. Raises ValueError where shapes do not fit.
+    """
+    slots, _, _, ends, _, screws, _, turning = tables
+    n, k, legs, most = len(actuators), len(turning), len(ends), max(slots[:, 1].max(), ends[:, 4].max())
+    if len(twists.values) not in (1, n) or np.ndim(actuators) != 2 or np.shape(actuators)[1] <= most:
+        raise ValueError(
+            f"actuator values {np.shape(actuators)}, twists at {len(twists.values)} points; allowed: (n, {most + 1}) "
+            "actuator values or more, twists at 1 or n points"
+        )
+    platform = np.concatenate([np.swapaxes(start.turn, 1, 2), np.asarray(start.position_mm)[:, None]], axis=1)
+    shapes = np.shape(actuators)[1:], (4, 3), (k,)
+    state = [
+        np.array(np.broadcast_to(part, (n, *shape)), dtype=float, order="C")
+        for part, shape in zip((actuators, platform, start.passive), shapes, strict=True)
+    ]
+    known = np.isfinite(sum(one.sum(axis=tuple(range(1, one.ndim))) for one in state))
+    drives, platform, passive = state
+    # links, a frame, screws and equations of one point after the other
+    room = tuple(np.empty(shape) for shape in ((len(screws) + legs, 4, 3), (4, 3), (len(screws), 6), (k + 6, k + 8)))
+    left, lacks = np.empty(n), np.zeros((n, legs, 6))
+    closure_kernel.solve(tables, room, drives, twists.values, twists.active, platform, passive, left, lacks)
+    if all_met:
+        arms = np.where(ends[:, 3], 1.0, closure_kernel.ARM_MM)
+        left = np.maximum(left, (np.linalg.norm(lacks, axis=2) * arms).max(axis=1))
+    left[~known] = np.inf
+    good = left < _CLOSED_MM
+    platform[~good], passive[~good] = np.nan, np.nan
+    return platform[:, 3].copy(), platform[:, :3].transpose(0, 2, 1).copy(), passive, left, good

@@ -236,7 +236,7 @@ def _newton(ends, bars, screws, numbers, turning, drives, twists, links, state, 
 def solve(tables, room, drives, twists, active, platform, passive, sizes, lacks):
     """Poses of n points, in place of where they start, under twists (n or 1, sites, 6) at the active sites (sites,).
 
-    tables, room: of `rrru.kinematics.closure_tables`; drives (n, K); platform (n, 4, 3): frames; passive (n, k). Writes
+    tables, room: of `rrru.kinematics.closure`; drives (n, K); platform (n, 4, 3): frames; passive (n, k). Writes
     the sizes (n,) of the last steps in mm, angles counted at the arm, and the legs' closure errors before, lacks (n,
     legs, 6): a bar's length first, a chain's twist. Points without a pose keep arbitrary values.
     """

@@ -11,7 +11,7 @@ import pandas as pd
 from rrru.diagnosis.verdict_text import probability, readable, rounded
 from rrru.errors import ConfigError
 from rrru.report import cells, compare, page
-from rrru.report.compare_gap import gap_difference
+from rrru.report.compare import gap_difference
 from rrru.report.compare_unseen import same_points, unseen
 
 _RESULTS = "results"

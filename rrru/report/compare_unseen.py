@@ -12,7 +12,7 @@ from rrru.campaign import measurements as rows
 from rrru.compensation.evaluate import model_residual
 from rrru.errors import FitError
 from rrru.pipeline import setup
-from rrru.report.compare import METHOD
+from rrru.report.compare import METHOD, over_runs
 
 # with fewer trajectories or runs than this a campaign is cut into as many stretches
 _FOLDS = 4
@@ -74,14 +74,6 @@ def _drawn(run):
         return run
     count = min(_STRETCHES, len(run) // _LEAST_STRETCH)
     return pd.Series(np.arange(len(run)) * max(count, 1) // max(len(run), 1), index=run.index)
-
-
-def over_runs(values, runs):
-    """Mean of values (n,) and its standard error, with runs as independent units; 0 where there is one run."""
-    by_run = values.groupby(runs).agg(["mean", "size"])
-    mean, weight, count = values.mean(), by_run["size"] / len(values), len(by_run)
-    square = (weight**2 * (by_run["mean"] - mean) ** 2).sum() * count / max(count - 1, 1)
-    return float(mean), float(np.sqrt(square))
 
 
 def _places(first, second):

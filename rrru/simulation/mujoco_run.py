@@ -2,15 +2,16 @@
 
 The path between two stops is driven, never jumped, with a smooth start and end, so that backlash and friction keep
 their states. At each point the robot is at rest and its loops are closed, or an error states how far they are not.
+Geometric errors, constant and by warming up, move the seats of bodies and of sites.
 """
 
 import mujoco
 import numpy as np
 from scipy.interpolate import Akima1DInterpolator, CubicHermiteSpline
+from scipy.spatial.transform import Rotation
 
 from rrru.errors import SimulationError, UnreachableError
 from rrru.simulation.mujoco_model import MM, PAYLOAD, STEP_S
-from rrru.simulation.mujoco_shape import Shape
 
 # a recorded point's loops are open by less, and its platform is slower, angles counted at an arm of half a metre: a
 # body held by friction creeps in MuJoCo by some um/s
@@ -215,3 +216,43 @@ def _smooth(steps):
     """Shares (steps,) from above 0 to 1 that start and end smoothly."""
     s = np.linspace(0.0, 1.0, steps + 1)[1:]
     return s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
+
+
+class Shape:
+    """Writes an Edit's shifts into its compiled model."""
+
+    def __init__(self, edit, model):
+        self.edit, self.model = edit, model
+        self.nominal = {
+            "body": (model.body_pos.copy(), model.body_quat.copy()),
+            "site": (model.site_pos.copy(), model.site_quat.copy()),
+        }
+
+    def write(self, share, seconds):
+        """Write a share of the shifts, and the growth after a time."""
+        model, warm = self.model, -np.expm1(-seconds / (self.edit.warming_s or np.inf))
+        for array, nominal in zip((model.body_pos, model.body_quat), self.nominal["body"], strict=True):
+            array[:] = nominal
+        for array, nominal in zip((model.site_pos, model.site_quat), self.nominal["site"], strict=True):
+            array[:] = nominal
+        for part, places in ((share, self.edit.shifts), (warm, self.edit.grows)):
+            for (kind, name, direction), size in places.items():
+                self._move(getattr(model, kind)(self.edit.prefix + name), direction, part * size)
+        for seat, pin in self.edit.seats.items():
+            at = model.site(self.edit.prefix + pin)
+            body = model.body(at.bodyid[0])
+            model.site(self.edit.prefix + seat).pos = body.pos + _turn(body.quat).apply(at.pos)
+
+    def _move(self, element, direction, size):
+        """Shift a body's or site's seat, or turn it, in the frame of what carries it."""
+        axis = np.eye(3)[direction % 3]
+        if direction < 3:
+            element.pos += size * axis
+        else:
+            turned = Rotation.from_rotvec(size * axis) * _turn(element.quat)
+            element.quat = turned.as_quat(scalar_first=True)
+
+
+def _turn(quat):
+    """Rotation of MuJoCo's quaternion."""
+    return Rotation.from_quat(quat, scalar_first=True)

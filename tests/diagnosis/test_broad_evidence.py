@@ -13,7 +13,7 @@ from scipy.stats import multivariate_normal, norm
 
 from rrru.diagnosis.evidence import PRIOR_SCALES, ModelEvidence
 from rrru.diagnosis.hypothesis import Hypothesis
-from rrru.diagnosis.marginal import Average
+from rrru.diagnosis.marginal_problem import Average
 from rrru.diagnosis.state import LinearizedProblem
 from rrru.diagnosis.terms import EffectTerm
 from rrru.diagnosis.whitened import DISCREPANCY_SCALES

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rrru.diagnosis.calibrate import calibrate
-from rrru.diagnosis.harmonic_orders import periodogram, resolution, with_orders
+from rrru.diagnosis.drive_spectra import periodogram, resolution, with_orders
 from rrru.diagnosis.settings import GapSettings
 from rrru.effects.protocol import ActiveEffect
 from tests.diagnosis.campaigns import EFFECTS, NOISE_MM, ROBOT, case_of, diagnosed, measure, strong

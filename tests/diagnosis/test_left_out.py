@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 
 from rrru.campaign import measurements as rows
-from rrru.diagnosis.left_out import left_out, left_out_note
+from rrru.diagnosis.result_tables import left_out, left_out_note
 from tests.diagnosis.campaigns import case_of, measure
 from tests.schemas import check
 

@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 
 from rrru.diagnosis.calibrate import calibrate
-from rrru.diagnosis.candidates import Candidates
 from rrru.diagnosis.discrepancy_basis import UNKNOWN
 from rrru.diagnosis.evidence import PRIOR_SCALES
 from rrru.diagnosis.hypothesis import Hypothesis
-from rrru.diagnosis.model_space import ModelSpace, explore
+from rrru.diagnosis.model_space import Candidates, ModelSpace, explore
 from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.posterior import Posterior, Weigher
 from rrru.diagnosis.settings import Prior

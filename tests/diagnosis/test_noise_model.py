@@ -10,7 +10,7 @@ from rrru.campaign import measurements as rows
 from rrru.campaign.noise import along_runs
 from rrru.diagnosis.calibrate import calibrate
 from rrru.diagnosis.diagnose import MeasuredRobot, diagnose, with_wide_bounds
-from rrru.diagnosis.harmonic_orders import with_orders
+from rrru.diagnosis.drive_spectra import with_orders
 from rrru.diagnosis.inference import with_noise
 from rrru.diagnosis.make_problem import make_case
 from rrru.diagnosis.settings import GapSettings

@@ -13,9 +13,9 @@ from rrru.campaign.driven_path import stops
 from rrru.campaign.ingest.campaign_file import ingest
 from rrru.campaign.ingest.spec import IngestSpec
 from rrru.campaign.schemas import measurement_table
+from rrru.diagnosis.approach_direction import paths_between_stops, undetermined_senses
 from rrru.diagnosis.diagnose import MeasuredRobot, diagnose
 from rrru.diagnosis.make_problem import make_case
-from rrru.diagnosis.stop_paths import paths_between_stops, undetermined_senses
 from rrru.effects.library import find
 from rrru.errors import ConfigError
 from rrru.kinematics.dynamics import Masses

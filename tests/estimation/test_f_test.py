@@ -9,7 +9,7 @@ from scipy import stats
 from rrru.errors import FitError
 from rrru.estimation.evidence import marginalize
 from rrru.estimation.f_test import LinearizedModel, largest_p, mean_p
-from rrru.estimation.observations.with_columns import WithColumns
+from rrru.estimation.observations.combined import WithColumns
 from rrru.estimation.parameters import Block, Parameters
 from rrru.estimation.problem import Problem, WhiteNoise
 from rrru.estimation.solver import estimate_at

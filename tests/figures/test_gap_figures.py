@@ -10,7 +10,8 @@ import pytest
 from matplotlib.colors import to_hex
 
 from rrru.errors import ConfigError
-from rrru.figures import gap_budget, style
+from rrru.figures import style
+from rrru.figures.gap import draw_budget
 from rrru.store import tables
 from rrru.studies.blind_validation import figures as withheld
 from rrru.studies.blind_validation.verdicts import PLANTS
@@ -318,7 +319,7 @@ def test_names_of_the_budget_neither_overlap_nor_leave_the_bar(covariance):
     with style.print_style():
         figure = style.new(style.DOUBLE_MM, 30.0)
         axes = figure.subplots()
-        gap_budget.draw(axes, table)
+        draw_budget(axes, table)
         figure.canvas.draw()
         boxes, bar = [text.get_window_extent() for text in axes.texts], axes.get_window_extent()
     assert len(boxes) == len(table)

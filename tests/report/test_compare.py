@@ -8,8 +8,8 @@ from scipy.stats import chi2, kstest
 from rrru import cli
 from rrru.errors import ConfigError
 from rrru.report import compare, compare_page
-from rrru.report.compare_gap import gap_difference
-from rrru.report.compare_unseen import _compared, over_runs, same_points, unseen
+from rrru.report.compare import gap_difference, over_runs
+from rrru.report.compare_unseen import _compared, same_points, unseen
 from tests.refusals import refusals
 from tests.report import campaigns
 from tests.report.campaigns import ERRORS, NOMINAL, joined, leave, measured

@@ -5,10 +5,10 @@ from functools import cache
 import numpy as np
 
 from rrru.campaign.plan import make_plan
-from rrru.campaign.stops import stops
 from rrru.campaign.trajectories import Line
 from rrru.formats.robot_file import from_mjcf
 from rrru.simulation.mujoco_robot import MujocoRobot
+from rrru.studies.methods.regions import stops
 from tests.places import ROOT
 
 MODELS = {"arm6": "tool0", "rrru3": "plate", "delta": "plate", "hexapod": "plate"}

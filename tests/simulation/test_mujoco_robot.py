@@ -4,7 +4,6 @@ import mujoco
 import numpy as np
 import pytest
 
-from rrru.campaign.stops import stops
 from rrru.errors import ConfigError, SimulationError, UnreachableError
 from rrru.formats.robot_file import from_urdf
 from rrru.pipeline import config as parts
@@ -14,6 +13,7 @@ from rrru.robots.rrru3 import Rrru3
 from rrru.simulation import mujoco_model, mujoco_run
 from rrru.simulation.mujoco_robot import MujocoRobot
 from rrru.simulation.tracker import Sees
+from rrru.studies.methods.regions import stops
 from tests.simulation.simulated import MODELS, file_of, mechanism, near_home, on_line, simulated, standing
 
 _AWAY = ((0.0, 0.0, 0.0), (60.0, 30.0, 20.0), (-50.0, 40.0, -30.0), (10.0, -60.0, 25.0))

@@ -10,22 +10,28 @@ import pandas as pd
 
 from rrru.campaign.ingest.checks import check_runs, check_speed, number_runs, resolution, stale
 from rrru.campaign.ingest.columns import REQUIRED, convert, known_columns, resolve
-from rrru.campaign.ingest.commands import with_commands
+from rrru.campaign.ingest.commands import check_end_effectors, with_commands, with_sent
 from rrru.campaign.ingest.contradictions import find_contradiction
 from rrru.campaign.ingest.formats import read_cells
-from rrru.campaign.ingest.geometry import beyond_ranges, check_commands, check_measured, check_sizes, plausibility_notes
+from rrru.campaign.ingest.geometry import (
+    beyond_ranges,
+    check_commands,
+    check_measured,
+    check_sizes,
+    frame_limit,
+    plausibility_notes,
+)
 from rrru.campaign.ingest.gross_errors import GrossError, find_gross_error, frame_advice
 from rrru.campaign.ingest.gross_file import ORDINARY_SHARE, GrossFile
 from rrru.campaign.ingest.guess import guess_columns
-from rrru.campaign.ingest.in_robot_frame import at_tool, jumps, outliers, register_sheet
 from rrru.campaign.ingest.mounting import Mounting, check_turned, mounting, places_instead
+from rrru.campaign.ingest.outliers import jumps, outliers
 from rrru.campaign.ingest.problems import Problems
-from rrru.campaign.ingest.registration import Registration
-from rrru.campaign.ingest.sent import check_end_effectors, with_sent
+from rrru.campaign.ingest.registration import Registration, register
 from rrru.campaign.ingest.sheet import COMMAND, MEASURED, NOISE, TARGET, TURNS, Sheet
 from rrru.campaign.ingest.spec import MM, IngestSpec
 from rrru.campaign.measurements import command, measured, turn_columns, turns, vector_columns
-from rrru.errors import ConfigError
+from rrru.errors import ConfigError, FitError
 from rrru.kinematics.robot import Robot
 
 
@@ -56,14 +62,14 @@ def ingest(spec: IngestSpec, mechanism: Robot) -> Ingested:
     same = check_sizes(sheet, mounted.offset_mm if mounted else 0.0)
     # where reflectors sit is looked at in a file without problems only: without their offsets nothing is too far off
     if same and spec.frame == "robot" and (mounted or "target" not in sheet.frame):
-        check_measured(at_tool(sheet, mounted), lambda: frame_advice(_gross_file(sheet)))
+        check_measured(_at_tool(sheet, mounted), lambda: frame_advice(_gross_file(sheet)))
         check_turned(sheet)
     sheet.problems.refuse()
-    registration = register_sheet(sheet, mounted, digit_mm) if spec.frame == "register" else None
+    registration = _register_sheet(sheet, mounted, digit_mm) if spec.frame == "register" else None
     if registration:
         moved = vector_columns("measured", registration.apply(measured(sheet.frame)))
         sheet = replace(sheet, frame=sheet.frame.assign(**moved))
-        check_measured(at_tool(sheet, mounted), lambda: "rows that belong to each other")
+        check_measured(_at_tool(sheet, mounted), lambda: "rows that belong to each other")
         sheet.problems.refuse()
         zeros = " and with the zeros of the drives that were found" if mounted and mounted.zeros_lost else ""
         left = f"{registration.rms_mm:.4g} mm rms, {registration.max_mm:.4g} mm at most"
@@ -171,6 +177,57 @@ def _refuse(sheet: Sheet, gross: GrossError, driven: bool) -> None:
     sheet.refuse_now(concerned, value, allowed)
 
 
+def _at_tool(sheet: Sheet, mounted: Mounting | None) -> Sheet:
+    """The sheet with the positions of reflectors carried to the tool, NaN where that is none, in the robot's frame."""
+    if mounted is None:
+        return sheet
+    carried = np.where(mounted.strays[:, None], np.nan, measured(sheet.frame) - mounted.offset_mm)
+    moved = vector_columns("measured", carried)
+    return replace(sheet, frame=sheet.frame.assign(**moved))
+
+
+def _register_sheet(sheet: Sheet, mounted: Mounting | None, digit_mm: float) -> Registration:
+    """Registration from the chosen points, without those that a first registration shows to be outliers."""
+    frame = sheet.frame
+    offset = mounted.offset_mm if mounted else 0.0
+    seen, target = measured(frame), command(frame) + offset
+    pairs = list(zip(frame["run"], frame["point"], strict=True))
+    wanted = {tuple(pair) for pair in sheet.spec.registration_points}
+    for run, point in sorted(wanted - set(pairs), key=str):
+        value = f"registration point (run {run}, point {point}), which the file lacks"
+        sheet.note("registration", None, value, f"points of the file: runs 1 to {frame['run'].max():g}")
+    sheet.problems.refuse()
+    chosen = np.array([not wanted or pair in wanted for pair in pairs])
+    if mounted:
+        chosen &= mounted.framing
+    try:
+        first = register(seen[chosen], target[chosen])
+        moved = frame.assign(**vector_columns("measured", first.apply(seen) - offset))
+        chosen &= ~outliers(moved, digit_mm)
+        result = register(seen[chosen], target[chosen])
+    except FitError as error:
+        value, _, allowed = str(error).partition("; allowed: ")
+        sheet.refuse_now(None, f"registration points: {value}", allowed)
+    if mirrored := _off_as_mirrored(seen[chosen], target[chosen]):
+        value = (
+            f"positions in a left-handed frame ({mirrored:.6g} mm rms off when registered, a fifth of that if mirrored)"
+        )
+        sheet.refuse_now(MEASURED, value, "a right-handed frame: reverse the sign of one axis")
+    if result.rms_mm > (limit := frame_limit(sheet.mechanism)):
+        value = f"distances in space of {result.rms_mm:.6g} mm rms after registration at {result.points} points"
+        sheet.refuse_now(MEASURED, value, f"at most {limit:g} mm rms: the same points in both frames")
+    return result
+
+
+def _off_as_mirrored(seen: np.ndarray, target: np.ndarray) -> float:
+    """Residual in mm rms of measured positions (n, 3) that fit far better with one axis reversed, else 0."""
+    try:
+        straight, mirrored = (register(seen * [1.0, 1.0, sign], target).rms_mm for sign in (1.0, -1.0))
+    except FitError:
+        return 0.0
+    return straight if straight > 1.0 and mirrored < 0.2 * straight else 0.0
+
+
 def _gross_file(sheet: Sheet) -> GrossFile | None:
     """The columns of a sheet in the form in which gross mistakes are searched."""
     return GrossFile.of(sheet.frame, sheet.spec, sheet.mechanism, sheet.found, unit_stated=True)
@@ -210,7 +267,7 @@ def _table(
     sheet: Sheet, mounted: Mounting | None, registration: Registration | None, digit_mm: float
 ) -> tuple[pd.DataFrame, list[str]]:
     """Frame in the form of the schema of measurements, and notes on implausible values and on outliers."""
-    seen, drives = at_tool(sheet, mounted).frame, sheet.drives
+    seen, drives = _at_tool(sheet, mounted).frame, sheet.drives
     values, turned = sheet.actuators(command(seen)), set(TURNS["measured"]) <= set(seen)
     wrong = mounted.strays if mounted else np.zeros(len(seen), dtype=bool)
     places = partial(places_instead, sheet)

@@ -6,10 +6,9 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Self
 
-from rrru.campaign.ingest.cells import Cells, read_bytes, text_cells
+from rrru.campaign.ingest.cells import Cells, parquet_cells, read_bytes, text_cells, xlsx_cells
 from rrru.campaign.ingest.problems import Problems
 from rrru.campaign.ingest.trackers import leica_cells, spatial_analyzer_cells
-from rrru.campaign.ingest.workbooks import parquet_cells, xlsx_cells
 from rrru.errors import ConfigError
 
 # reader of a file's bytes by kind, and keys that the kind knows

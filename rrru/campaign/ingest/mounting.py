@@ -10,10 +10,10 @@ from scipy.spatial.transform import Rotation
 
 from rrru.campaign import measurements as rows
 from rrru.campaign.driven_path import stops
-from rrru.campaign.ingest.bodies import strays
 from rrru.campaign.ingest.frames import Frames
 from rrru.campaign.ingest.gross_advice import place_words
 from rrru.campaign.ingest.orientations import other_readings
+from rrru.campaign.ingest.outliers import strays
 from rrru.campaign.ingest.sheet import MEASURED, TURNS, position_text
 from rrru.campaign.ingest.zero_offsets import LARGE, LOST, found_zeros
 from rrru.campaign.target_registration import axes_by_turning

@@ -16,8 +16,7 @@ import pandas as pd
 
 from rrru.campaign import measurements as rows
 from rrru.diagnosis.design import poses
-from rrru.diagnosis.design.contests import contests_of
-from rrru.diagnosis.design.expected_information import greedy, realized, worth
+from rrru.diagnosis.design.expected_information import contests_of, greedy, realized, worth
 from rrru.diagnosis.design.run_limits import RunLimits, StatedLimits, run_limits
 from rrru.diagnosis.make_problem import make_case
 from rrru.diagnosis.options import OPTIONS

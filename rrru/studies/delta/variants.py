@@ -6,8 +6,7 @@ import numpy as np
 
 from rrru.calibration.calibrate import calibrate, estimate_deviations
 from rrru.campaign.measurements import vectors
-from rrru.estimation.observations.distances import Distances
-from rrru.estimation.observations.shapes import Shape
+from rrru.estimation.observations.distances import Distances, Shape
 from rrru.estimation.observations.target_positions import TargetHeights, TargetPositions
 from rrru.simulation.tracker import measure
 from rrru.studies.delta.zero_offset import one_step, step_fit

@@ -26,7 +26,7 @@ from scipy import stats
 from scipy.spatial.transform import Rotation
 
 from rrru.estimation.f_test import largest_p
-from rrru.estimation.observations.with_columns import WithColumns
+from rrru.estimation.observations.combined import WithColumns
 from rrru.estimation.parameters import Block, Parameters
 from rrru.estimation.problem import Problem, WhiteNoise
 from rrru.estimation.solver import solve

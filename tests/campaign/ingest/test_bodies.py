@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from rrru.campaign.ingest.bodies import strays
+from rrru.campaign.ingest.outliers import strays
 
 _TOOL = {"a": (100.0, 0.0, 0.0), "b": (0.0, 80.0, 10.0), "c": (-60.0, -50.0, 30.0)}
 _TABLE = {"t1": (500.0, 100.0, -600.0), "t2": (300.0, -400.0, -600.0)}

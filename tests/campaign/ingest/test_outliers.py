@@ -6,8 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rrru.campaign.ingest.in_robot_frame import outliers
-from rrru.campaign.ingest.outliers import flag_outliers, frequent_jumps, reproduced
+from rrru.campaign.ingest.outliers import flag_outliers, frequent_jumps, outliers, reproduced
 from tests.places import DATA
 
 NOISE_MM = 0.02

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rrru.diagnosis.design.contests import contests_of
+from rrru.diagnosis.design.expected_information import contests_of
 from rrru.diagnosis.hypothesis import Hypothesis
 from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.posterior import Posterior

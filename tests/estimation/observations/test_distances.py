@@ -6,8 +6,7 @@ from scipy.spatial.transform import Rotation
 
 from rrru.calibration.calibrate import calibrate, estimate_deviations
 from rrru.errors import FitError
-from rrru.estimation.observations.distances import Distances
-from rrru.estimation.observations.shapes import Shape
+from rrru.estimation.observations.distances import Distances, Shape
 from rrru.estimation.observations.target_positions import TargetHeights, TargetPositions
 from rrru.robots.delta import Delta
 

@@ -5,8 +5,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from rrru.errors import FitError
+from rrru.estimation.observations.combined import Joined, Part
 from rrru.estimation.observations.inclinations import Inclinations, base_tilt
-from rrru.estimation.observations.joined import Joined, Part
 from rrru.estimation.observations.target_positions import TargetPositions
 from rrru.estimation.parameters import Block, Parameters
 from rrru.estimation.problem import Problem, WhiteNoise

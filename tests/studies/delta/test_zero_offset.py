@@ -5,8 +5,7 @@ import pytest
 
 from rrru.calibration.calibrate import calibrate
 from rrru.errors import FitError
-from rrru.estimation.observations.distances import Distances
-from rrru.estimation.observations.shapes import Shape
+from rrru.estimation.observations.distances import Distances, Shape
 from rrru.estimation.observations.target_positions import TargetHeights
 from rrru.robots.delta import Delta
 from rrru.studies.delta.zero_offset import one_step, step_fit, taken_for_errors

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from rrru.kinematics.spheres import lower_intersection
+from rrru.robots.tripod import lower_intersection
 from rrru.studies.printers import firmware, printer_causes, printer_fit
 from rrru.studies.printers.files import read
 from tests.places import DATA

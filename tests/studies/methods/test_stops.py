@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.distance import pdist
 
 from rrru.campaign.speed_profile import Trapezoid
-from rrru.campaign.stops import cylinder_points, nearest_first, stops
+from rrru.studies.methods.regions import cylinder_points, nearest_first, stops
 
 
 def test_points_fill_their_cylinder_evenly():

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from rrru.kinematics.spheres import lower_intersection
+from rrru.robots.tripod import lower_intersection
 from tests.reference import tripods_slow
 
 _coordinate = st.floats(-500.0, 500.0)

@@ -1,8 +1,10 @@
-"""Several kinds in one problem: rows in standard deviations of each kind's own noise, each in its own places."""
+"""Observations made of others: rows in standard deviations of each kind's own noise, and columns of more parameters."""
 
 import numpy as np
+import pytest
 
-from rrru.estimation.observations.joined import Joined, Part
+from rrru.errors import FitError
+from rrru.estimation.observations.combined import Joined, Part, WithColumns
 from rrru.estimation.parameters import Block, Parameters
 from rrru.estimation.problem import Problem, WhiteNoise
 from rrru.estimation.solver import solve
@@ -49,3 +51,16 @@ def test_the_joint_estimate_is_generalised_least_squares():
     normal = dense.T @ dense
     np.testing.assert_allclose(found.values, np.linalg.solve(normal, dense.T @ read), atol=1e-9)
     np.testing.assert_allclose(found.covariance, np.linalg.inv(normal), atol=1e-9)
+
+
+def test_more_parameters_change_the_readings_by_their_columns():
+    generator = np.random.default_rng(1)
+    matrix, columns, read = generator.normal(size=(6, 2, 3)), generator.normal(size=(6, 2, 2)), np.ones((6, 2))
+    own, values = WithColumns(LinearizedProblem(matrix, read), columns), generator.normal(size=5)
+    np.testing.assert_allclose(own.residual(values), read - matrix @ values[:3] - columns @ values[3:], atol=1e-12)
+    np.testing.assert_array_equal(own.jacobian(values), -np.concatenate([matrix, columns], axis=2))
+
+
+def test_columns_without_a_value_are_refused():
+    with pytest.raises(FitError, match="columns of an effect are not finite"):
+        WithColumns(LinearizedProblem(np.zeros((2, 1, 1)), np.zeros((2, 1))), np.full((2, 1, 1), np.nan))
