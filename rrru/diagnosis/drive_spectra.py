@@ -59,7 +59,8 @@ def with_spectra(case, linear, terms):
                 library.pop(effect.name)
             continue
         columns, roots = linear.columns[effect.name, 0].reshape(len(data), -1), effect.coordinates.roots
-        best, prior_scale, noise = likeliest(data, _without(columns, basis), roots, basis.shape[1])
+        of_one = effect.coordinates.of_one
+        best, prior_scale, noise = likeliest(data, _without(columns, basis), (roots, of_one), basis.shape[1])
         library[effect.name] = _chosen(effect, _visible(columns, roots[best], prior_scale / noise), prior_scale)
         changed.append((effect.name, 0))
     return replace(case, library=library), changed
@@ -273,19 +274,20 @@ def _chosen(effect, by_drive, prior_scale):
     return _mixed(effect, [its / unit for its in by_drive], changes)
 
 
-def likeliest(data, columns, roots, fitted):
+def likeliest(data, columns, spectra, fitted):
     """Number of the spectrum of highest likelihood, the factor of its sizes, and the noise, of data (m,).
 
-    columns (m, c); roots: by spectrum and drive as of `Coordinates`. All drives together and each one alone are tried,
+    columns (m, c); spectra: `roots` and `of_one` as of `Coordinates`. All drives together and each one alone are tried,
     whatever is likeliest counts. fitted: number of parameters fitted together with them.
     """
     gram, moment, square = columns.T @ columns, columns.T @ data, float(data @ data)
     found = []
-    for number, by_drive in enumerate(roots):
+    for number, (by_drive, of_one) in enumerate(zip(*spectra, strict=True)):
         root = block_diag(*by_drive)
         scaled, along = root.T @ gram @ root, root.T @ moment
         drive = np.repeat(np.arange(len(by_drive)), [its.shape[1] for its in by_drive])
-        for its in (drive >= 0, *(drive == k for k in range(len(by_drive)) if len(by_drive) > 1)):
+        alone = [drive == k for k in range(len(by_drive))]
+        for its in alone if of_one or len(alone) == 1 else (drive >= 0, *alone):
             value, factor, noise = _likeliest_factor(scaled[np.ix_(its, its)], along[its], square, len(data) - fitted)
             # each drive is as probable as another
             found.append((value - (not its.all()) * np.log(len(by_drive)), number, factor, noise))

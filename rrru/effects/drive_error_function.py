@@ -9,7 +9,7 @@ u_i is the angle of a drive that turns, and pi q_i / L_i of one that slides: L_i
 any function, 1 m where none is stated. It enters at the drive's value. The coefficients of order n are independent and
 normal. This is a Gaussian process on the circle. Their standard deviation is in proportion to one of
 
-    1 / sqrt(1 + (n / b)^2)    with steps, as where two pieces of a scale are joined
+    1 / sqrt(1 + (n / b)^2)    with steps, as where two pieces of a scale are joined; of one drive alone
     1 / sqrt(1 + (n / b)^4)    with corners
     exp(-(n / b)^2 / 2)        smooth
 
@@ -32,14 +32,15 @@ from rrru.effects.protocol import Coordinates, Effect
 from rrru.parameters import Parameter, ParameterSet
 
 ORDERS = np.arange(1, 129)
-# by the kind of a function its falling off with order / bend, and its bends in waves per turn
+# by the kind of a function its falling off with order / bend, its bends in waves per turn, and whether it is a fault of
+# one drive
 _SPECTRA = (
-    # with steps
-    (lambda at: (1.0 + at**2) ** -0.5, (3.0, 12.0, 48.0)),
+    # with steps: ASSUME no robot has several scales that are joined with an offset
+    (lambda at: (1.0 + at**2) ** -0.5, (3.0, 12.0, 48.0), True),
     # with corners
-    (lambda at: (1.0 + at**4) ** -0.5, (3.0, 6.0, 12.0, 24.0, 48.0)),
+    (lambda at: (1.0 + at**4) ** -0.5, (3.0, 6.0, 12.0, 24.0, 48.0), False),
     # smooth
-    (lambda at: np.exp(-0.5 * at**2), (3.0, 6.0, 12.0, 24.0)),
+    (lambda at: np.exp(-0.5 * at**2), (3.0, 6.0, 12.0, 24.0), False),
 )
 _TYPICAL, _MOST = {"rad": 1e-4, "mm": 0.02}, {"rad": 0.01, "mm": 2.0}
 _STROKE_MM = 1000.0
@@ -59,7 +60,7 @@ def for_robot(robot):
     typical = np.repeat([_TYPICAL[unit] for unit in units], 2 * len(ORDERS))
     spectra = tuple(
         typical * np.tile(np.repeat(falling(ORDERS / bend), 2), len(units))
-        for falling, bends in _SPECTRA
+        for falling, bends, _ in _SPECTRA
         for bend in bends
     )
     per_unit = _per_unit(robot)
@@ -70,6 +71,7 @@ def for_robot(robot):
         none > 0,
         lambda values, _: values,
         spectra=spectra,
+        of_one=tuple(alone for _, bends, alone in _SPECTRA for _ in bends),
         broad=True,
     )
 

@@ -175,10 +175,11 @@ class Coordinates:
     parameter values (p,); weights: prior probabilities of the shapes, None where all are equal; searched: continuous
     hyperparameter in addition to the listed shapes; stated: number of shapes, from the first on, that the user has
     stated; doubt: relative s.d. of a hyperparameter, or s.d. of the order of a searched one; broad: whether the
-    coordinates are so many that they are marginalised before the other effects are fitted; spectra: prior s.d. (c,)
-    of the coordinates, among which the campaign chooses; roots: the same of coordinates that a campaign resolves, by
-    spectrum and drive (c_k, r_k): root @ root.T is the prior covariance; sized: whether it has chosen, and `typical`
-    is its choice; log_prior: log prior probability of a choice that was made outside of the fit.
+    coordinates are so many that they are marginalised before the other effects are fitted; spectra: prior s.d. (c,) of
+    the coordinates, among which the campaign chooses; of_one: by spectrum, whether only one drive has it; roots: the
+    same of coordinates that a campaign resolves, by spectrum and drive (c_k, r_k): root @ root.T is the prior
+    covariance; sized: whether it has chosen, and `typical` is its choice; log_prior: log prior probability of a choice
+    that was made outside of the fit.
     """
 
     typical: np.ndarray
@@ -194,6 +195,7 @@ class Coordinates:
     doubt: float = 0.3
     broad: bool = False
     spectra: tuple[np.ndarray, ...] = ()
+    of_one: tuple[bool, ...] = ()
     roots: tuple[tuple[np.ndarray, ...], ...] = ()
     sized: bool = False
     log_prior: float = 0.0

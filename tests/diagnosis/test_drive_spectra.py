@@ -142,14 +142,14 @@ def test_the_spectrum_that_made_the_data_is_the_likeliest():
     keep = np.concatenate([np.arange(2 * 48), count + np.arange(2 * 48)])
     columns = whole[:, keep] - basis @ (basis.T @ whole[:, keep])
     spectra, hits, draws = [one[keep] for one in effect.coordinates.spectra], 0, 0
-    roots = [[np.diag(own) for own in np.split(size, 2)] for size in spectra]
+    roots, several = [[np.diag(own) for own in np.split(size, 2)] for size in spectra], [False] * len(spectra)
     for number, size in enumerate(spectra):
         for seed in range(4):
             generator = np.random.default_rng([number, seed])
             prior_scale = generator.uniform(0.7, 2.0)
             data = columns @ (prior_scale * size * generator.standard_normal(len(size)))
             data = data + NOISE_MM * generator.standard_normal(len(data))
-            found, factor, noise = likeliest(data - basis @ (basis.T @ data), columns, roots, basis.shape[1])
+            found, factor, noise = likeliest(data - basis @ (basis.T @ data), columns, (roots, several), basis.shape[1])
             assert noise == pytest.approx(NOISE_MM, rel=0.1)
             power, true = (factor * spectra[found]) ** 2, (prior_scale * size) ** 2
             shows = true * (columns**2).sum(axis=0) > 3.0 * NOISE_MM**2
@@ -167,13 +167,13 @@ def test_one_drive_alone_has_the_size_that_it_has():
     basis, _ = np.linalg.qr(linear.base.reshape(linear.data.size, -1))
     found = case.library[effect.name]
     columns, roots = linear.columns[effect.name, 0].reshape(linear.data.size, -1), found.coordinates.roots
-    generator, factors = np.random.default_rng(8), []
+    spectra, generator, factors = (roots, found.coordinates.of_one), np.random.default_rng(8), []
     for _ in range(8):
         root = roots[4][2]
         of_drive = columns[:, found.coordinates.legs == 3] @ (3.0 * root @ generator.standard_normal(root.shape[1]))
         data = of_drive + NOISE_MM * generator.standard_normal(len(of_drive))
         _, factor, _ = likeliest(
-            data - basis @ (basis.T @ data), columns - basis @ (basis.T @ columns), roots, basis.shape[1]
+            data - basis @ (basis.T @ data), columns - basis @ (basis.T @ columns), spectra, basis.shape[1]
         )
         factors.append(factor)
     assert np.median(factors) == pytest.approx(3.0, rel=0.3)
