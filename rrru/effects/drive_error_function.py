@@ -13,10 +13,10 @@ normal. This is a Gaussian process on the circle. Their standard deviation is in
     1 / sqrt(1 + (n / b)^4)    with corners
     exp(-(n / b)^2 / 2)        smooth
 
-with waves up to about b per turn. The likelihood chooses the kind and b among some values, for all drives or for one
-alone. The result is the spectrum of the error. A gear's sharp orders are `transmission_error` and
-`transmission_orders`: where few waves suffice, these have fewer coefficients and a higher evidence. Only what the
-measured range of a drive resolves is fitted.
+with waves up to about b per turn, with steps to order 128, else to 64. The likelihood chooses the kind and b among some
+values, for all drives or for one alone. The result is the spectrum of the error. A gear's sharp orders are
+`transmission_error` and `transmission_orders`: where few waves suffice, these have fewer coefficients and a higher
+evidence. Only what the measured range of a drive resolves is fitted.
 
 Assumptions: it depends on the drive's value only, not on load or sense of motion; all drives of a kind that err have
 errors of one size.
@@ -32,15 +32,15 @@ from rrru.effects.protocol import Coordinates, Effect
 from rrru.parameters import Parameter, ParameterSet
 
 ORDERS = np.arange(1, 129)
-# by the kind of a function its falling off with order / bend, its bends in waves per turn, and whether it is a fault of
-# one drive
+# by the kind of a function its falling off with order / bend, its bends in waves per turn, its highest order, and
+# whether it is a fault of one drive
 _SPECTRA = (
-    # with steps: ASSUME no robot has several scales that are joined with an offset
-    (lambda at: (1.0 + at**2) ** -0.5, (3.0, 12.0, 48.0), True),
+    # with steps, which high orders make: ASSUME no robot has several scales that are joined with an offset
+    (lambda at: (1.0 + at**2) ** -0.5, (3.0, 12.0, 48.0), 128, True),
     # with corners
-    (lambda at: (1.0 + at**4) ** -0.5, (3.0, 6.0, 12.0, 24.0, 48.0), False),
+    (lambda at: (1.0 + at**4) ** -0.5, (3.0, 6.0, 12.0, 24.0, 48.0), 64, False),
     # smooth
-    (lambda at: np.exp(-0.5 * at**2), (3.0, 6.0, 12.0, 24.0), False),
+    (lambda at: np.exp(-0.5 * at**2), (3.0, 6.0, 12.0, 24.0), 64, False),
 )
 _TYPICAL, _MOST = {"rad": 1e-4, "mm": 0.02}, {"rad": 0.01, "mm": 2.0}
 _STROKE_MM = 1000.0
@@ -59,8 +59,8 @@ def for_robot(robot):
     )
     typical = np.repeat([_TYPICAL[unit] for unit in units], 2 * len(ORDERS))
     spectra = tuple(
-        typical * np.tile(np.repeat(falling(ORDERS / bend), 2), len(units))
-        for falling, bends, _ in _SPECTRA
+        typical * np.tile(np.repeat(falling(ORDERS / bend) * (highest >= ORDERS), 2), len(units))
+        for falling, bends, highest, _ in _SPECTRA
         for bend in bends
     )
     per_unit = _per_unit(robot)
@@ -71,7 +71,7 @@ def for_robot(robot):
         none > 0,
         lambda values, _: values,
         spectra=spectra,
-        of_one=tuple(alone for _, bends, alone in _SPECTRA for _ in bends),
+        of_one=tuple(alone for _, bends, _, alone in _SPECTRA for _ in bends),
         broad=True,
     )
 
