@@ -27,7 +27,7 @@ from rrru.diagnosis.state import State
 from rrru.diagnosis.terms import signatures
 from rrru.effects.harmonic import drives_of, waves
 
-# places of a drive's measured range: a wave of 64 per turn has ten and more
+# places of a drive's measured range: on one turn a wave of order 128 has five and more
 _PLACES = 721
 # share of the largest function's power below which a function is rounding
 _LEAST_POWER = 1e-10

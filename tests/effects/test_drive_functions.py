@@ -174,7 +174,7 @@ def test_the_waves_of_a_slide_make_any_function_of_its_stroke(robot, stroke, mot
     np.testing.assert_allclose(again, functions, atol=1e-11)
 
 
-@pytest.mark.parametrize("span", [0.2, 1.0, 7.0])
+@pytest.mark.parametrize("span", [0.2, 1.0, 7.0, 60.0])
 def test_what_a_range_resolves_is_the_same_process_there(span, motion):
     """Covariances of the functions over the measured range, of each drive and spectrum; a few coefficients do it."""
     whole, generator = _law(FUNCTION), np.random.default_rng(3)
