@@ -134,6 +134,18 @@ def paper_options():
     }
 
 
+def redraw_settings(count):
+    """Settings of a job about draws of the reproduced campaign; count: the key of `reproduce` with their number."""
+    chosen = {config["reproduce"][key] for key in ("line_calibration", "spiral_calibration")}
+    keys = ("line_calibration", "spiral_calibration", "method", count)
+    return {
+        "nominal": parts.nominal(config, REPRODUCED),
+        "virtual": parts.virtual(config, REPRODUCED),
+        "sets": {name: patterns for name, patterns in parts.sets(config, REPRODUCED).items() if name in chosen},
+        **reads("calibration.use_near_singularity", *(f"reproduce.{key}" for key in keys)),
+    }
+
+
 def template_digests():
     """Digests of a page's templates, by name."""
     files = sorted(Path(rrru.report.__file__).parent.glob("templates/*"))

@@ -36,18 +36,6 @@ PAPERS["A"] = {
 }
 
 
-def _redraw_settings(count):
-    """Settings of a job about draws of the reproduced campaign; count: the key of `reproduce` with their number."""
-    chosen = {config["reproduce"][key] for key in ("line_calibration", "spiral_calibration")}
-    keys = ("line_calibration", "spiral_calibration", "method", count)
-    return {
-        "nominal": parts.nominal(config, REPRODUCED),
-        "virtual": parts.virtual(config, REPRODUCED),
-        "sets": {name: patterns for name, patterns in parts.sets(config, REPRODUCED).items() if name in chosen},
-        **reads("calibration.use_near_singularity", *(f"reproduce.{key}" for key in keys)),
-    }
-
-
 # all values and seeds of one swept setting in one interpretation of the paper
 rule sweep:
     input:
@@ -95,7 +83,7 @@ rule redraws:
     log:
         f"{RESULTS}/logs/redraws.log",
     params:
-        settings=_redraw_settings("redraws"),
+        settings=redraw_settings("redraws"),
         code=code("redraws"),
     script:
         "../../scripts/redraws.py"
@@ -108,7 +96,7 @@ rule draw_ranks:
     log:
         f"{RESULTS}/logs/draw_ranks.log",
     params:
-        settings=_redraw_settings("ranked"),
+        settings=redraw_settings("ranked"),
         code=code("draw_ranks"),
     script:
         "../../scripts/draw_ranks.py"
