@@ -39,8 +39,8 @@ _SPECTRA = (
     (lambda at: (1.0 + at**2) ** -0.5, (3.0, 12.0, 48.0), 128, True),
     # with corners
     (lambda at: (1.0 + at**4) ** -0.5, (3.0, 6.0, 12.0, 24.0, 48.0), 64, False),
-    # smooth
-    (lambda at: np.exp(-0.5 * at**2), (3.0, 6.0, 12.0, 24.0), 64, False),
+    # smooth, of a short part of a turn: fewer waves are what eccentricity, gears and others make
+    (lambda at: np.exp(-0.5 * at**2), (12.0, 24.0), 64, False),
 )
 _TYPICAL, _MOST = {"rad": 1e-4, "mm": 0.02}, {"rad": 0.01, "mm": 2.0}
 _STROKE_MM = 1000.0
