@@ -28,7 +28,7 @@ from rrru.campaign.ingest.mounting import Mounting, check_turned, mounting, plac
 from rrru.campaign.ingest.outliers import jumps, outliers
 from rrru.campaign.ingest.problems import Problems
 from rrru.campaign.ingest.registration import Registration, register
-from rrru.campaign.ingest.sheet import COMMAND, MEASURED, NOISE, TARGET, TURNS, Sheet
+from rrru.campaign.ingest.sheet import COMMAND, MEASURED, NOISE, TARGET, TURNS, Sheet, rows_text
 from rrru.campaign.ingest.spec import MM, IngestSpec
 from rrru.campaign.measurements import command, measured, turn_columns, turns, vector_columns
 from rrru.errors import ConfigError, FitError
@@ -83,11 +83,8 @@ def ingest(spec: IngestSpec, mechanism: Robot) -> Ingested:
     table, more = _table(sheet, mounted, registration, digit_mm)
     if len(repeated):
         table.loc[sheet.frame.index.isin(repeated.index), "status"] = "stale"
-        listed = ", ".join(map(str, repeated.index[:10])) + (", ..." if len(repeated) > 10 else "")
-        more = [
-            *more,
-            f"{len(repeated)} stale readings, equal to an earlier one in every digit, left out: rows {listed}",
-        ]
+        which = f"equal to an earlier one in every digit, left out: {rows_text(repeated.index)}"
+        more = [*more, f"{len(repeated)} stale readings, {which}"]
     return Ingested(table, (*notes, *more, *(mounted.notes if mounted else ())), registration)
 
 
@@ -284,14 +281,11 @@ def _table(
         computed |= sheet.spec.motion.columns()
     frame = sheet.frame.assign(**computed, status=np.where(outlier, "outlier", "ok"))
     if outlier.any():
-        where = ", ".join(f"row {row}" for row in frame.index[outlier][:10])
-        more = ", ..." if outlier.sum() > 10 else ""
         count = int(outlier.sum())
         points = "1 point marked as outlier" if count == 1 else f"{count} points marked as outliers"
-        notes.append(f"{points}, in the table but not in fits: {where}{more}")
+        notes.append(f"{points}, in the table but not in fits: {rows_text(frame.index[outlier])}")
     if (jumping := jumps(seen, digit_mm) & ~outlier).any():
-        where = ", ".join(f"row {row}" for row in frame.index[jumping][:10])
-        where += ", ..." if jumping.sum() > 10 else ""
+        where = rows_text(frame.index[jumping])
         notes.append(
             f"at least {jumping.sum()} points jump off their neighbours, in runs where more than a tenth do: {where}. "
             "A loose joint does that, so fits use them. If no joint is loose, the instrument is the cause: delete them"

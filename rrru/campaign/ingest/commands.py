@@ -14,7 +14,7 @@ import numpy as np
 from rrru.campaign.ingest.formats import read_cells
 from rrru.campaign.ingest.guess import names_trajectories
 from rrru.campaign.ingest.problems import Problems
-from rrru.campaign.ingest.sheet import COMMAND, position_text
+from rrru.campaign.ingest.sheet import COMMAND, position_text, rows_text
 from rrru.campaign.measurements import vector_columns
 
 _ONE = "all"
@@ -142,9 +142,8 @@ def with_sent(frame, mechanism, problems):
             allowed = "values at which the nominal robot closes near its home pose, or commanded positions besides them"
             problems.add("no pose", row=frame.index[i], column=", ".join(drives), value=value, allowed=allowed)
     elif lost.any():
-        listed = ", ".join(f"row {row}" for row in frame.index[lost][:10]) + (", ..." if lost.sum() > 10 else "")
         why = "the nominal robot has no pose near its home pose at their drive values"
-        notes.append(f"left out, since {why}: {lost.sum()} of {len(frame)} rows, {listed}")
+        notes.append(f"left out, since {why}: {lost.sum()} of {len(frame)} rows, {rows_text(frame.index[lost])}")
         frame = frame[~lost]
     return frame, notes
 

@@ -19,6 +19,9 @@ MEASURED = tuple(f"measured_{axis}_mm" for axis in AXES)
 NOISE = tuple(f"noise_{axis}_mm" for axis in AXES)
 TARGET = tuple(f"target_{axis}_mm" for axis in AXES)
 
+# rows that a note lists
+_SHOWN_ROWS = 10
+
 
 @dataclass(frozen=True)
 class Sheet:
@@ -78,6 +81,11 @@ class Sheet:
 def drive_name(mechanism):
     """Quantity in a robot's columns of actuator values."""
     return _DRIVE_NAMES.get(frozenset(mechanism.parts.units), "actuator values")
+
+
+def rows_text(numbers):
+    """Rows by number in words, the first ten of them."""
+    return ", ".join(f"row {number}" for number in numbers[:_SHOWN_ROWS]) + ", ..." * (len(numbers) > _SHOWN_ROWS)
 
 
 def position_text(position):

@@ -26,19 +26,12 @@ FloatArray = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Distances:
-    """Distances of n places from the first one.
-
-    mechanism: its `parameters` are estimated; actuators (n, K), measured_mm (n, 3): actuator values and places in any
-    one frame. Every distance has the first place's noise too. Unless `alike`, residuals are multiplied by `whitener`,
-    which makes them independent with the noise of one axis each. The paper gives all distances equal weight.
-    Raises FitError where a number is not finite.
-    """
+class _Places:
+    """Places measured_mm (n, 3) at actuators (n, K) of a mechanism. Raises FitError where a number is not finite."""
 
     mechanism: Robot
     actuators: FloatArray
     measured_mm: FloatArray
-    alike: bool = False
 
     # ASSUME a laser tracker on a small machine, per axis of a place; a calibration takes what the residuals show
     default_sd: ClassVar[float] = 0.02
@@ -47,6 +40,19 @@ class Distances:
     def __post_init__(self) -> None:
         require_finite(self.actuators, "actuators")
         require_finite(self.measured_mm, "measured_mm")
+
+
+@dataclass(frozen=True)
+class Distances(_Places):
+    """Distances of n places from the first one.
+
+    mechanism: its `parameters` are estimated; actuators (n, K), measured_mm (n, 3): actuator values and places in any
+    one frame. Every distance has the first place's noise too. Unless `alike`, residuals are multiplied by `whitener`,
+    which makes them independent with the noise of one axis each. The paper gives all distances equal weight.
+    Raises FitError where a number is not finite.
+    """
+
+    alike: bool = False
 
     def __len__(self) -> int:
         return len(self.actuators) - 1
@@ -95,24 +101,12 @@ def _from_first(places_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 @dataclass(frozen=True)
-class Shape:
+class Shape(_Places):
     """The whole shape of n places, the frame's rotation and origin free.
 
     mechanism, actuators (n, K), measured_mm (n, 3): as in `Distances`. The 3 n differences are projected on the 3 n - 6
     directions that no motion of the frame reaches. Raises FitError where a number is not finite.
     """
-
-    mechanism: Robot
-    actuators: FloatArray
-    measured_mm: FloatArray
-
-    # ASSUME a laser tracker on a small machine, per axis of a place; a calibration takes what the residuals show
-    default_sd: ClassVar[float] = 0.02
-    unit: ClassVar[str] = "mm"
-
-    def __post_init__(self) -> None:
-        require_finite(self.actuators, "actuators")
-        require_finite(self.measured_mm, "measured_mm")
 
     def __len__(self) -> int:
         return len(self.actuators)

@@ -202,7 +202,7 @@ def test_stale_readings_are_left_out_and_named(field, expected, tmp_path):
         spoilt.loc[row, MEASURED] = field.loc[row - 1, MEASURED].to_numpy()
     result = ingest(IngestSpec(written(spoilt, tmp_path / "file.csv")), ROBOT)
     assert np.flatnonzero(result.measurements["status"] == "stale").tolist() == [8, 100]
-    text = "2 stale readings, equal to an earlier one in every digit, left out: rows 10, 102"
+    text = "2 stale readings, equal to an earlier one in every digit, left out: row 10, row 102"
     assert text in result.notes
 
 

@@ -1,6 +1,24 @@
 """Progress of the search for the twin."""
 
-from rrru.figures import choose, style
+from rrru.figures import style
+from rrru.studies.rrru3.study_numbers import TOLERANCE
+
+_BEST, _HIGHEST, _COLUMNS = 3, 1.5, 3
+# items of printed numbers in words
+_WORDS = {
+    "group1_before": "group 1 before calibration",
+    "group1_after": "group 1 after calibration",
+    "lines_before": "lines before calibration",
+    "lines_after": "lines after calibration",
+    "lines_objective": "line calibration:\nmean error",
+    "lines_2_7_under_spiral": "lines 2 to 7, spiral's calibration",
+    "spiral_under_lines": "spiral, lines' calibration",
+    "spiral_under_lines_x": "spiral's x, lines' calibration",
+    "spiral_under_lines_z_abs": "spiral's z, lines' calibration",
+    "spiral_under_spiral": "spiral, own calibration",
+    "spiral_under_spiral_component": "spiral's x, y, z, own calibration",
+}
+_ENDS = {"min": "smallest error", "max": "largest error"}
 
 
 @style.printed
@@ -41,6 +59,7 @@ def twin_tradeoff(tables, _options):
     rows = -(-len(items) // columns)
     figure = style.new(style.DOUBLE_MM, 12.0 + 58.0 * rows)
     grid = figure.subplots(rows, columns, squeeze=False).ravel()
+    figure.suptitle("values as shares of what the paper prints")
     for axes, item in zip(grid, items, strict=False):
         _tradeoff(axes, table[table["item"] == item])
     for axes in grid[len(items) :]:
@@ -55,17 +74,21 @@ def _tradeoff(axes, rows):
     axes.plot(own["ratio"], other["ratio"], "o-", color=style.BLUE, markersize=3.5, linewidth=0.8)
     # searches that found nothing better end at the same place
     places = own.assign(other=other["ratio"].to_numpy()).groupby(["ratio", "other"])["weight"]
+    right = 0.5 * (own["ratio"].min() + own["ratio"].max())
     for place, weights in places:
-        text = "x " + ", ".join(f"{weight:g}" for weight in weights)
-        axes.annotate(text, place, textcoords="offset points", xytext=(4, 4), fontsize=7.0)
+        text = "weight " + ", ".join(f"{weight:g}" for weight in weights)
+        side = {"xytext": (-5, 4), "ha": "right"} if place[0] > right else {"xytext": (5, -8), "ha": "left"}
+        axes.annotate(text, place, textcoords="offset points", fontsize=7.0, **side)
     box = {"facecolor": "#eeeeee", "edgecolor": "none", "zorder": 0}
     axes.axvspan(1.0 - TOLERANCE, 1.0 + TOLERANCE, **box)
     axes.axhspan(1.0 - TOLERANCE, 1.0 + TOLERANCE, **box)
-    axes.set(xlabel=f"{choose.plain(item)}\n(share of printed)", ylabel=f"{choose.plain(partner)}\n(share of printed)")
-    axes.margins(0.2)
+    axes.set(xlabel=_in_words(item), ylabel=_in_words(partner))
+    axes.margins(0.3, 0.2)
     axes.grid(True)
 
 
-_BEST, _HIGHEST, _COLUMNS = 3, 1.5, 3
-# of a matched number, as in `study_numbers`
-TOLERANCE = 0.15
+def _in_words(item):
+    """Label of an axis with an item."""
+    stem, _, end = item.rpartition("_")
+    text = _WORDS[item] if item in _WORDS else f"{_WORDS[stem]}:\n{_ENDS[end]}"
+    return text
