@@ -61,8 +61,12 @@ WITHOUT_UNIT = (
         "experiment",
     ),
     *("evaluations of a restart", "objective (nat)"),
-    *(f"{kind} after {end}\n(share of printed)" for kind in ("group1", "lines") for end in ("min", "max")),
-    "lines objective\n(share of printed)",
+    *(
+        f"{which} after calibration:\n{end} error / printed"
+        for which in ("group 1", "lines")
+        for end in ("smallest", "largest")
+    ),
+    "line calibration:\nmean error / printed",
     *("experiment, curve driven backwards", "payload (kg)", "slider", "scatter per travel (µm/mm)", "residual (µm)"),
     "azimuth of the first point (°)",
     *("model", "waves per turn", "row", "x (m)", "y (m)", "share of the gap's mean square (%)"),

@@ -6,14 +6,12 @@ Leading axes (...) of all arrays are draws; without them the results are single 
 import numpy as np
 from scipy.signal import find_peaks
 
-from rrru.studies.rrru3.paper import ERRORS_MM, TABLE_5, TABLE_6
+from rrru.studies.rrru3.paper import ERRORS_MM, TABLE_5, TABLE_6, TOLERANCE
 
 # trajectories that the numbers need
 TRAJECTORIES = {*(f"line_{k}" for k in range(1, 8)), "spiral"}
 # printed as "less than": met when not above
 UPPER_LIMITS = ("spiral_under_lines_z_abs_max",)
-# largest relative deviation of a matched number
-TOLERANCE = 0.15
 LINKS = ("dL1", "dL2", "dL3")
 # "nearly the same": the largest difference between Tables 5 and 6
 _LINKS_APART_MM = max(abs(TABLE_5[name] - TABLE_6[name]) for name in LINKS)

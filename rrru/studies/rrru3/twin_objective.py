@@ -14,7 +14,7 @@ nat; it is positive, and 0 would be certainty.
 import numpy as np
 
 from rrru.studies.rrru3 import study_numbers as numbers
-from rrru.studies.rrru3.paper import ERRORS_MM, printed_half_mm
+from rrru.studies.rrru3.paper import ERRORS_MM, TOLERANCE, printed_half_mm
 
 # the least standard deviation over draws: numbers that do not vary at all have a finite probability
 _LEAST_SCATTER = 1e-6
@@ -56,7 +56,7 @@ def draw_misfit(found, orders):
     for item, printed in ERRORS_MM.items():
         deviation = found[item] / printed - 1.0
         off = max(deviation, 0.0) if item in numbers.UPPER_LIMITS else deviation
-        total += np.log1p((off / numbers.TOLERANCE) ** 2)
+        total += np.log1p((off / TOLERANCE) ** 2)
     return float(total + np.log(2.0) * sum(margin <= 0.0 for margin in orders.values()))
 
 

@@ -1,7 +1,7 @@
 """Progress of the search for the twin."""
 
 from rrru.figures import style
-from rrru.studies.rrru3.study_numbers import TOLERANCE
+from rrru.studies.rrru3.paper import TOLERANCE
 
 _BEST, _HIGHEST, _COLUMNS = 3, 1.5, 3
 # items of printed numbers in words
@@ -59,7 +59,6 @@ def twin_tradeoff(tables, _options):
     rows = -(-len(items) // columns)
     figure = style.new(style.DOUBLE_MM, 12.0 + 58.0 * rows)
     grid = figure.subplots(rows, columns, squeeze=False).ravel()
-    figure.suptitle("values as shares of what the paper prints")
     for axes, item in zip(grid, items, strict=False):
         _tradeoff(axes, table[table["item"] == item])
     for axes in grid[len(items) :]:
@@ -88,7 +87,7 @@ def _tradeoff(axes, rows):
 
 
 def _in_words(item):
-    """Label of an axis with an item."""
+    """Label of an axis with an item over what is printed of it."""
     stem, _, end = item.rpartition("_")
     text = _WORDS[item] if item in _WORDS else f"{_WORDS[stem]}:\n{_ENDS[end]}"
-    return text
+    return f"{text} / printed"
