@@ -363,8 +363,10 @@ def _cause(effect, follow, with_shares, facts):
         parameters = per_load if len(per_load) < len(parameters) else []
     sizes = _sizes(parameters)
     unsized = massless and not sizes
-    listed = ", ".join(sizes) if len(sizes) <= OPTIONS.max_listed_numbers else f"{len(sizes)} numbers"
-    size = f", {listed}" if sizes else ""
+    many = len(sizes) > OPTIONS.max_listed_numbers
+    # the coefficients of a function say less than its largest value, which follows
+    sizes = [] if many and effect["worst_places"] else [f"{len(sizes)} numbers"] if many else sizes
+    size = "".join(f", {one}" for one in sizes)
     meaning = f": {effect['meaning']}" if effect["meaning"] else ""
     said = f"{share} {readable(effect['name'])}{place}{size}{meaning}.{_worst(effect['worst_places'])}"
     return f"{said} {_NO_SIZE}" if unsized else said

@@ -171,9 +171,9 @@ CAUSES = {
     ),
     "drive_error_function": Cause(
         {
-            TURNING: "the error of the drive is a rough periodic function of its own angle",
-            SLIDING: "the error of the slide is a rough function of its own position",
-            LENGTH: "the error of the leg is a rough function of its own length",
+            TURNING: "the error of the drive is a function of its own angle",
+            SLIDING: "the error of the slide is a function of its own position",
+            LENGTH: "the error of the leg is a function of its own length",
         },
         {
             TURNING: "Inspect the drive at the angle of the largest error: encoder's scale for dirt, scratches and "
