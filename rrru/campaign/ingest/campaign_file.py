@@ -200,7 +200,7 @@ def _register_sheet(sheet: Sheet, mounted: Mounting | None, digit_mm: float) -> 
     try:
         first = register(seen[chosen], target[chosen])
         moved = frame.assign(**vector_columns("measured", first.apply(seen) - offset))
-        chosen &= ~outliers(moved, digit_mm)
+        chosen &= ~outliers(moved, digit_mm, partial(_jacobian, sheet))
         result = register(seen[chosen], target[chosen])
     except FitError as error:
         value, _, allowed = str(error).partition("; allowed: ")
@@ -214,6 +214,12 @@ def _register_sheet(sheet: Sheet, mounted: Mounting | None, digit_mm: float) -> 
         value = f"distances in space of {result.rms_mm:.6g} mm rms after registration at {result.points} points"
         sheet.refuse_now(MEASURED, value, f"at most {limit:g} mm rms: the same points in both frames")
     return result
+
+
+def _jacobian(sheet: Sheet) -> np.ndarray:
+    """Derivative (n, 3, p) of the commanded positions by the errors of the nominal robot's geometry."""
+    position = command(sheet.frame)
+    return sheet.mechanism.parameter_jacobian(position, sheet.actuators(position))
 
 
 def _off_as_mirrored(seen: np.ndarray, target: np.ndarray) -> float:
@@ -269,7 +275,7 @@ def _table(
     wrong = mounted.strays if mounted else np.zeros(len(seen), dtype=bool)
     places = partial(places_instead, sheet)
     notes = [*plausibility_notes(seen[~wrong], sheet.mechanism, places), *beyond_ranges(values, sheet.mechanism)]
-    outlier = outliers(seen, digit_mm) | wrong
+    outlier = outliers(seen, digit_mm, partial(_jacobian, sheet)) | wrong
     computed = dict(zip(drives, values.T, strict=True))
     if turned or mounted or sheet.mechanism.orients:
         computed |= turn_columns("command", sheet.poses.turn)

@@ -10,6 +10,8 @@ reflector that is off from most others of its body was confused with another one
 disagree it is unknown which one is right: both are marked.
 """
 
+from collections.abc import Callable
+
 import numpy as np
 import pandas as pd
 
@@ -30,19 +32,30 @@ _BAD_SHARE, _JUMP_FACTOR, _LOOSEST_MM = 0.1, 2.0, 1.5
 # A bad end point pulls at its neighbour by a third, a bad neighbour at the end by as much as it is off itself.
 _END_PREFERENCE = 1.5
 
+# a deviation of which less than this is left beside errors of the geometry is theirs
+_EXPLAINED = 0.5
+# parameters of a rigid motion; numbers that a fit of the geometry must have to spare
+_RIGID, _LEAST_SPARE = 6, 20
+
 # ASSUME no body bends by a millimetre, and reflectors are further apart than that
 _FAR_MM = 1.0
 # a body on which more than this share is off is not rigid: its reflectors move against each other
 _MAX_SHARE = 0.2
 
 
-def outliers(frame: pd.DataFrame, digit_mm: float) -> np.ndarray:
-    """Rows (n,) that a broken beam spoilt, positions being in the robot frame; digit_mm: last digit of the file."""
+def outliers(frame: pd.DataFrame, digit_mm: float, jacobian: Callable[[], np.ndarray]) -> np.ndarray:
+    """Rows (n,) that a broken beam spoilt, positions being in the robot frame.
+
+    digit_mm: last digit of the file; jacobian: makes the derivative (n, 3, p) of the commanded positions by the
+    geometry. It is made only for stops in no order.
+    """
     target, run = command(frame), series(frame)
     deviation = measured(frame) - target
     marked = flag_outliers(deviation, run, noise_mm=digit_mm, place=path_length(target))
     if not follows_path(target, run):
         marked &= far_from_all(deviation, run)
+        if marked.any():
+            marked &= ~like_geometry(deviation, target, jacobian(), marked)
     return marked & ~reproduced(marked, deviation, target, run)
 
 
@@ -112,6 +125,29 @@ def far_from_all(deviation_mm, run, threshold=6.0):
         off = np.linalg.norm(deviation[rows] - np.median(deviation[rows], axis=0), axis=1)
         result[rows] = off > threshold * robust_sd(off, MEDIAN_OF_LENGTH, _SPIKE_MM)
     return result
+
+
+def like_geometry(deviation_mm, command_mm, jacobian, marked):
+    """Which marked points (n,) have the deviation that errors of the geometry make there, at least half of it.
+
+    Near a singularity a small error of the geometry moves the platform far. The errors are fitted by least squares to
+    the deviations (n, 3) in mm of the other points, to first order, together with a rigid motion; jacobian (n, 3, p):
+    derivative of the position by them. None where the other points do not determine the fit.
+    """
+    # unknown poses and readings: their deviation is compared with nothing
+    known = np.isfinite(jacobian).all(axis=(1, 2)) & np.isfinite(deviation_mm).all(axis=1)
+    fitted = known & ~marked
+    if 3 * fitted.sum() < jacobian.shape[2] + _RIGID + _LEAST_SPARE:
+        return np.zeros(len(marked), dtype=bool)
+    arm = command_mm - command_mm[fitted].mean(axis=0)
+    turns = np.cross(np.eye(3)[:, None], arm[None]).transpose(1, 2, 0)
+    columns = np.concatenate([jacobian, np.tile(np.eye(3), (len(arm), 1, 1)), turns], axis=2)
+    # columns in different units; those of parameters without influence stay zero
+    size = np.linalg.norm(columns[fitted], axis=(0, 1))
+    columns = columns / np.where(size > 0.0, size, 1.0)
+    errors = np.linalg.lstsq(columns[fitted].reshape(-1, len(size)), deviation_mm[fitted].ravel())[0]
+    left = np.linalg.norm(deviation_mm - columns @ errors, axis=1)
+    return marked & known & (left < _EXPLAINED * np.linalg.norm(deviation_mm, axis=1))
 
 
 def reproduced(marked, deviation_mm, command_mm, run, tolerance_mm=0.6):

@@ -5,8 +5,11 @@ import pandas as pd
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 
 from rrru.campaign.ingest.outliers import flag_outliers, frequent_jumps, outliers, reproduced
+from rrru.campaign.measurements import vector_columns
+from rrru.robots.hexapod import hexapod
 from tests.places import DATA
 
 NOISE_MM = 0.02
@@ -194,8 +197,37 @@ def test_of_stops_in_no_order_only_what_is_far_from_all_is_marked(seed):
     deviation = noisy(rng, grows * (1.0 + command @ rng.normal(size=(3, 3))))
     bad = int(rng.integers(10, 140))
     deviation[bad] += bad_block(rng, 1, 60.0)[0]
-    columns = {"trajectory": "stops", "run": 1.0}
-    for name, values in (("command", 300.0 * command), ("measured", 300.0 * command + deviation)):
-        columns |= {f"{name}_{axis}_mm": values[:, k] for k, axis in enumerate("xyz")}
-    marked = outliers(pd.DataFrame(columns), 0.001)
+    marked = outliers(_stops(300.0 * command, 300.0 * command + deviation), 0.001, lambda: np.zeros((150, 3, 0)))
     assert marked[bad] and marked.sum() == 1
+
+
+def _stops(command_mm, measured_mm):
+    """A file's columns of stops in no order."""
+    columns = vector_columns("command", command_mm) | vector_columns("measured", measured_mm)
+    return pd.DataFrame({"trajectory": "stops", "run": 1.0, **columns})
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_errors_of_the_geometry_near_a_singularity_are_no_outliers(seed):
+    """A hexapod with legs that are off by some tenths, driven far from home; a broken beam stands out."""
+    rng = np.random.default_rng(seed)
+    angles = np.radians([0.0, 110.0, 120.0, 230.0, 240.0, 350.0])
+    base, plate = (
+        np.stack([size * np.cos(at), size * np.sin(at), 0.0 * at], axis=1)
+        for size, at in ((400.0, angles), (220.0, angles + np.radians([25.0, -25.0] * 3)))
+    )
+    robot = hexapod(base, plate, 500.0, parameter_set="full")
+    home = robot.inverse(robot.legs.home_mm[None])
+    drive = home + rng.uniform(-120.0, 120.0, (300, 6))
+    place = robot.forward(drive)
+    known = np.isfinite(place).all(axis=1)
+    place, drive = place[known], drive[known]
+    off = rng.normal(0.0, [0.3 if unit == "mm" else 1e-3 for unit in robot.parameters.units])
+    attained = robot.forward(drive, off, place)
+    known = np.isfinite(attained).all(axis=1)
+    place, drive, measured = place[known], drive[known], noisy(rng, attained[known])
+    bad = int(rng.integers(len(place)))
+    measured[bad] += bad_block(rng, 1, 60.0)[0]
+    marked = outliers(_stops(place, measured), 0.001, lambda: robot.parameter_jacobian(place, drive))
+    # very near a singularity the first order is not enough
+    assert marked[bad] and marked.sum() <= 2
