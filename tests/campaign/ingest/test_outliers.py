@@ -5,7 +5,6 @@ import pandas as pd
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.spatial.transform import Rotation
 
 from rrru.campaign.ingest.outliers import flag_outliers, frequent_jumps, outliers, reproduced
 from rrru.campaign.measurements import vector_columns
