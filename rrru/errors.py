@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 from pathlib import Path
+from typing import TypedDict
 
 
 class RrruError(Exception):
@@ -12,15 +13,24 @@ class ConfigError(RrruError):
     """The configuration asks for something that does not exist or does not fit together."""
 
 
-class IngestError(RrruError):
-    """A measurement file is refused.
+class Problem(TypedDict):
+    """A problem of a measurement file.
 
-    `problems` is a tuple of dicts with the keys `file`, `row`, `column`, `value`, `allowed`; `row` is the number that
-    an editor shows, of the line of a text or the row of a sheet; of parquet files, which have no header line, it is
-    counted from 1. It is None where the whole file or column is meant.
+    `row` is the number that an editor shows, of the line of a text or the row of a sheet; of parquet files, which have
+    no header line, it is counted from 1. It is None where the whole file or column is meant.
     """
 
-    def __init__(self, problems: Iterable[dict]) -> None:
+    file: str
+    row: int | None
+    column: str | None
+    value: str
+    allowed: str
+
+
+class IngestError(RrruError):
+    """A measurement file is refused; `problems` is a tuple of each `Problem`."""
+
+    def __init__(self, problems: Iterable[Problem]) -> None:
         self.problems = tuple(problems)
         super().__init__("\n".join(_problem_text(p) for p in self.problems))
 
@@ -71,7 +81,7 @@ _UNREADABLE = {
 }
 
 
-def _problem_text(problem: dict) -> str:
+def _problem_text(problem: Problem) -> str:
     """One line: file, row, column, value, allowed."""
     where = [str(problem["file"])]
     if problem.get("row") is not None:

@@ -1,8 +1,10 @@
 """The path behind a measurement table, as far as its columns determine it. Lengths in mm, times in s."""
 
 from itertools import pairwise
+from typing import TypeAlias
 
 import numpy as np
+import pandas as pd
 
 from rrru.campaign import measurements as rows
 from rrru.campaign.plan import connect
@@ -16,6 +18,9 @@ DEGREE = 5
 _DRIVES_WAY = 0.1
 # a path turns by more than a right angle at fewer of its points than this; poses in random order do so at three of four
 _MOST_TURNS = 0.5
+# the commanded course by name, see `_path_through`
+Course: TypeAlias = dict[str, np.ndarray]
+
 # a bend above the first limit next to a bend below the second is a corner, in rad
 _CORNER, _STRAIGHT = 0.2, 0.02
 # an interval at a run's end or a corner that is this much slower than the next leads to rest
@@ -25,21 +30,23 @@ _SLOWER = 0.9
 _STILL_MM, _STILL_RAD = 0.05, 5e-4
 
 
-def driven_path(measurements, degree=DEGREE):
+def driven_path(measurements: pd.DataFrame, degree: int = DEGREE) -> tuple[np.ndarray, Course]:
     """`_path_through` the rows of a measurement table; several reflectors measured at one pose are one stop."""
     stop = stops(measurements)
     path, course = _path_through(measurements[np.diff(stop, prepend=-1) > 0], degree)
     return path, {name: values[stop] for name, values in course.items()}
 
 
-def drive_rates(measurements, actuators):
+def drive_rates(measurements: pd.DataFrame, actuators: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Derivatives (n, K) by the time, first and second, of actuator values (n, K) as `rates` of each stop has them."""
     stop = stops(measurements)
     first = np.diff(stop, prepend=-1) > 0
     return tuple(values[stop] for values in rates(measurements[first], actuators[first]))
 
 
-def smooth_drives(measurements, path, path_index, degree=DEGREE):
+def smooth_drives(
+    measurements: pd.DataFrame, path: np.ndarray, path_index: np.ndarray, degree: int = DEGREE
+) -> np.ndarray:
     """Actuator values (N, K) along the path of `driven_path`: in each run a spline through the measured points.
 
     path (N, K): their values from run to run, and where the points follow no path; path_index (n,): its rows at the
@@ -62,7 +69,7 @@ def smooth_drives(measurements, path, path_index, degree=DEGREE):
     return result
 
 
-def stops(measurements):
+def stops(measurements: pd.DataFrame) -> np.ndarray:
     """Number (n,) from 0 on of the stop at which each row was measured: several reflectors may be seen at one.
 
     Rows at one command are one stop, too, where the campaign states that the robot rests at each reading.
@@ -77,7 +84,7 @@ def stops(measurements):
     return np.cumsum(np.concatenate([[False], moved]))
 
 
-def _path_through(measurements, degree):
+def _path_through(measurements: pd.DataFrame, degree: int) -> tuple[np.ndarray, Course]:
     """The path (N, 3) of everything that is driven, transfers included, and what the robot was commanded to do on it.
 
     degree: odd, of the splines through a run's points. The commanded course is by name, of the n rows of a measurement
@@ -94,13 +101,13 @@ def _path_through(measurements, degree):
     pieces = _runs(run)
     velocity, acceleration = rates(measurements, position)
     parts = [position[piece] for piece in pieces]
-    smooth = (_through(part, _chords(part), _corners(part), degree) for part in parts)
-    path, index = connect(*zip(*smooth, strict=True), _TRANSFER_STEPS)
+    smooth = [_through(part, _chords(part), _corners(part), degree) for part in parts]
+    path, index = connect([points for points, _ in smooth], [at for _, at in smooth], _TRANSFER_STEPS)
     course |= {"position_mm": position, "velocity_mm_s": velocity, "acceleration_mm_s2": acceleration}
     return path, course | {"path_index": index}
 
 
-def rates(measurements, values):
+def rates(measurements: pd.DataFrame, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """First and second derivative (n, k) by the time of values (n, k) at the rows of a measurement table, run by run.
 
     Zero where the campaign states that the robot rests at each reading; NaN where a run has no increasing times or it
@@ -113,10 +120,11 @@ def rates(measurements, values):
     if not passes_points(measurements):
         return np.full_like(values, np.nan), np.full_like(values, np.nan)
     derivatives = [_run_rates(values[piece], time[piece], _corners(position[piece])) for piece in _runs(run)]
-    return tuple(np.concatenate(parts) for parts in zip(*derivatives, strict=True))
+    first, second = zip(*derivatives, strict=True)
+    return np.concatenate(first), np.concatenate(second)
 
 
-def passes_points(measurements):
+def passes_points(measurements: pd.DataFrame) -> bool:
     """Whether the robot passes the rows of a measurement table without a stop: as stated, else by `follows_path`."""
     stated = stated_motion(measurements)
     if stated is not None:
@@ -124,7 +132,7 @@ def passes_points(measurements):
     return follows_path(rows.command(measurements), measurements["run"].to_numpy())
 
 
-def follows_path(position_mm, run):
+def follows_path(position_mm: np.ndarray, run: np.ndarray) -> bool:
     """Whether positions (n, 3) in runs (n,) are along paths; otherwise each is a stop, reached from the one before."""
     moved = np.concatenate([[True], (np.diff(position_mm, axis=0) != 0.0).any(axis=1)])
     position_mm, run = position_mm[moved], np.asarray(run)[moved]
@@ -133,17 +141,17 @@ def follows_path(position_mm, run):
     return not len(turns) or turns.mean() <= _MOST_TURNS
 
 
-def _runs(run):
+def _runs(run: np.ndarray) -> list[slice]:
     """Slices of the rows of each run, from the rows' run numbers (n,)."""
     return [slice(*ends) for ends in pairwise([*np.flatnonzero(starts_of_runs(run)), len(run)])]
 
 
-def starts_of_runs(run):
+def starts_of_runs(run: np.ndarray) -> np.ndarray:
     """Rows (m,) that begin a run, from the rows' run numbers (m,)."""
     return np.concatenate([[True], np.diff(run) != 0])
 
 
-def _corners(position_mm):
+def _corners(position_mm: np.ndarray) -> np.ndarray:
     """Points (c,) of the path (k, 3) of one run at which it has a corner, after its first and before its last point.
 
     # ASSUME a path that is straight at three points is straight between them, and a bend next to it is a corner. One
@@ -157,10 +165,10 @@ def _corners(position_mm):
     bend = 2.0 * np.arcsin(np.clip(0.5 * np.linalg.norm(np.diff(step, axis=0), axis=1), 0.0, 1.0))
     # the bend beyond an end is unknown
     next_to_straight = (np.array([np.inf, *bend[:-1]]) < _STRAIGHT) | (np.array([*bend[1:], np.inf]) < _STRAIGHT)
-    return moved[1:-1][(bend > _CORNER) & next_to_straight]
+    return np.asarray(moved[1:-1][(bend > _CORNER) & next_to_straight])
 
 
-def _run_rates(values, time, corners):
+def _run_rates(values: np.ndarray, time: np.ndarray, corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """`_derivatives` of values (k, j) of one run at times (k,); at corners (c,) the mean of those of both sides."""
     result = np.full((2, *values.shape), np.nan)
     for first, last in pairwise([0, *corners, len(values) - 1]):
@@ -171,7 +179,7 @@ def _run_rates(values, time, corners):
     return tuple(result)
 
 
-def _derivatives(points, time):
+def _derivatives(points: np.ndarray, time: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """First and second derivative (k, j) along the points (k, j) of a run or a part of it.
 
     NaN without increasing times. An end is one of rest where the robot slows down towards it; else the recording
@@ -190,12 +198,12 @@ def _derivatives(points, time):
     return spline(time, 1), acceleration
 
 
-def _chords(points):
+def _chords(points: np.ndarray) -> np.ndarray:
     """Distances (k - 1,) from each of points (k, j) to the next."""
-    return np.linalg.norm(np.diff(points, axis=0), axis=1)
+    return np.asarray(np.linalg.norm(np.diff(points, axis=0), axis=1))
 
 
-def _through(points, way, corners, degree):
+def _through(points: np.ndarray, way: np.ndarray, corners: np.ndarray, degree: int) -> tuple[np.ndarray, np.ndarray]:
     """Points (N, j) of a path through the points (k, j) of one run, smooth from corner to corner (c,) of them, and the
     rows (k,) of these in it.
 
@@ -206,7 +214,7 @@ def _through(points, way, corners, degree):
     return path, np.arange(len(points)) * STEPS
 
 
-def _smooth(points, way, degree):
+def _smooth(points: np.ndarray, way: np.ndarray, degree: int) -> np.ndarray:
     """Points (N, j) of a smooth path through points (k, j), way (k - 1,) apart."""
     from scipy.interpolate import make_interp_spline
 
@@ -217,7 +225,7 @@ def _smooth(points, way, degree):
     length = np.concatenate([[0.0], np.cumsum(np.maximum(way, 1e-6 * max(way.max(), 1e-6)))])
     fine = np.interp(np.arange(at[-1] + 1), at, length)
     if len(points) == 2:
-        return points[0] + (fine / length[-1])[:, None] * (points[1] - points[0])
+        return np.asarray(points[0] + (fine / length[-1])[:, None] * (points[1] - points[0]))
     path = make_interp_spline(length, points, k=min(degree, len(points) - 1 - len(points) % 2))(fine)
     path[at] = points
-    return path
+    return np.asarray(path)

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterable
 from fnmatch import fnmatchcase
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -10,6 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from rrru.kinematics.base_parameters import MeasurementConfig
 from rrru.kinematics.readings import Readings, place_on_platform
+from rrru.kinematics.robot import Robot
 
 USED = ("ok", "near_singularity")
 # rows of a held-out test: no fit uses them, but the robot was there
@@ -20,7 +20,7 @@ ON_PLATFORM, ON_WORLD = "platform", "world"
 
 def vectors(frame: pd.DataFrame, name: str) -> np.ndarray:
     """Positions (n, 3) in mm that a table holds in the columns name_x_mm, name_y_mm and name_z_mm."""
-    return frame[[f"{name}_{axis}_mm" for axis in "xyz"]].to_numpy(dtype=float)
+    return np.asarray(frame[[f"{name}_{axis}_mm" for axis in "xyz"]].to_numpy(dtype=float))
 
 
 def vector_columns(name: str, values: np.ndarray) -> dict[str, np.ndarray]:
@@ -99,11 +99,11 @@ def sites(targets: pd.Series) -> pd.Series:
 def series(measurements: pd.DataFrame) -> np.ndarray:
     """Numbers (n,) of the runs, those of each reflector apart: rows that follow one another smoothly."""
     if "target" not in measurements:
-        return measurements["run"].to_numpy()
-    return measurements.groupby(["run", "target"], sort=False).ngroup().to_numpy() + 1
+        return np.asarray(measurements["run"].to_numpy())
+    return np.asarray(measurements.groupby(["run", "target"], sort=False).ngroup().to_numpy() + 1)
 
 
-def at_tool(measurements: pd.DataFrame, robot: Any) -> pd.DataFrame:
+def at_tool(measurements: pd.DataFrame, robot: Robot) -> pd.DataFrame:
     """The table with the tool's positions alone: those of reflectors carried to it, as the nominal robot holds them.
 
     Without the rows of reflectors that it does not hold.
@@ -120,22 +120,22 @@ def at_tool(measurements: pd.DataFrame, robot: Any) -> pd.DataFrame:
     return plain.assign(**vector_columns("measured", measured(measurements) - offset))
 
 
-def actuators(measurements: pd.DataFrame, robot: Any) -> np.ndarray:
+def actuators(measurements: pd.DataFrame, robot: Robot) -> np.ndarray:
     """Commanded actuator values (n, K) of a robot, angles in rad or lengths in mm."""
-    return measurements[robot.parts.columns].to_numpy(dtype=float)
+    return np.asarray(measurements[robot.parts.columns].to_numpy(dtype=float))
 
 
 def on_trajectories(measurements: pd.DataFrame, patterns: Iterable[str]) -> np.ndarray:
     """Rows (n,) on trajectories whose name fits one of the patterns (* matches anything)."""
     names = measurements["trajectory"].unique()
     chosen = [name for name in names if any(fnmatchcase(name, pattern) for pattern in patterns)]
-    return measurements["trajectory"].isin(chosen).to_numpy()
+    return np.asarray(measurements["trajectory"].isin(chosen).to_numpy())
 
 
 def usable(measurements: pd.DataFrame, use_near_singularity: bool = True) -> np.ndarray:
     """Rows (n,) that fits may use: measured, no outlier and, if so asked, not near a singularity."""
     allowed = USED if use_near_singularity else USED[:1]
-    return measurements["status"].isin(allowed).to_numpy() & np.isfinite(measured(measurements)).all(axis=1)
+    return np.asarray(measurements["status"].isin(allowed).to_numpy() & np.isfinite(measured(measurements)).all(axis=1))
 
 
 def hold_out(measurements: pd.DataFrame, chosen: np.ndarray) -> pd.DataFrame:

@@ -1,9 +1,13 @@
 """The measuring noise of a campaign where it is not stated."""
 
+from collections.abc import Iterable
+
 import numpy as np
 import numpy.typing as npt
+import pandas as pd
 
 from rrru.campaign import measurements as rows
+from rrru.kinematics.readings import Readings
 
 # degrees of freedom from which on repeated points determine the noise
 ENOUGH_REPEATS = 30
@@ -23,7 +27,7 @@ def along_runs(
     return result, wave
 
 
-def repeat_noise(measurements):
+def repeat_noise(measurements: pd.DataFrame) -> tuple[float, int]:
     """Noise per axis in mm from points measured more than once under the same conditions, and its degrees of freedom.
 
     Repeats share the trajectory, the commanded position, the direction of motion, speed and payload. NaN and 0 where
@@ -40,7 +44,7 @@ def repeat_noise(measurements):
     return (float(np.sqrt((deviation**2).sum() / freedom)) if freedom else np.nan), freedom
 
 
-def typical(axes):
+def typical(axes: Iterable[np.ndarray]) -> float:
     """One standard deviation from those of single readings, an array per axis: medians, then root mean square.
 
     Medians, since single readings may be far worse than all others.
@@ -48,7 +52,7 @@ def typical(axes):
     return float(np.sqrt(np.mean([np.nanmedian(axis) ** 2 for axis in axes])))
 
 
-def read_noise(measurements):
+def read_noise(measurements: pd.DataFrame) -> float | None:
     """Noise per axis in mm that the instrument stated with its readings, None where it stated none.
 
     # ASSUME one size for all points: the model discrepancy is larger than the differences of the readings' standard
@@ -61,18 +65,18 @@ def read_noise(measurements):
     return typical(known.to_numpy().T) if len(known) else None
 
 
-def quieter_repeats(measurements, noise_mm, correlation=0.0):
+def quieter_repeats(measurements: pd.DataFrame, noise_mm: float, correlation: float = 0.0) -> float | None:
     """Noise per axis in mm of repeated poses where it is clearly less than an estimate, None where it is not.
 
     correlation: of the noise from reading to reading; correlated noise has fewer effective degrees of freedom.
     """
-    repeated, count = repeat_noise(measurements)
-    count *= (1.0 - correlation**2) / (1.0 + correlation**2)
+    repeated, freedom = repeat_noise(measurements)
+    count = freedom * (1.0 - correlation**2) / (1.0 + correlation**2)
     clearly = count >= ENOUGH_REPEATS and 0.0 < repeated < noise_mm * (1.0 - 3.0 / np.sqrt(2.0 * count))
     return repeated if clearly else None
 
 
-def reading_series(measurements, readings=None):
+def reading_series(measurements: pd.DataFrame, readings: Readings | None = None) -> np.ndarray:
     """Numbers (m,) of the smooth series in the rows of the readings of n points, by default positions.
 
     A series is a run, of each reflector separately, with orientations separate from positions.

@@ -1,13 +1,16 @@
 """The commanded motion: runs along trajectories with times, speed, payload and path. Lengths mm, times s."""
 
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from rrru.campaign.measurements import vector_columns
 from rrru.campaign.speed_profile import Trapezoid
-from rrru.campaign.trajectories import sample
+from rrru.campaign.trajectories import Trajectory, sample
+from rrru.kinematics.robot import Robot
 
 # Points of the path between two sampled points: enough for `backlash` to see a drive that turns back between them.
 _PATH_STEPS = 16
@@ -28,7 +31,7 @@ class Run:
     speed_mm_s: float
     payload_kg: float
 
-    def resting(self, settle_s):
+    def resting(self, settle_s: float) -> "Run":
         """The run of a robot that waits at every point until it rests, and is read then."""
         still, waited = np.zeros_like(self.points_mm), settle_s * np.arange(len(self.points_mm))
         return replace(self, time_s=self.time_s + waited, velocity_mm_s=still, acceleration_mm_s2=still)
@@ -41,7 +44,7 @@ class Plan:
     runs: tuple[Run, ...]
     dwell_s: float
 
-    def commands(self, mechanism):
+    def commands(self, mechanism: Robot) -> pd.DataFrame:
         """Table of the commanded points: run, trajectory, point, time, position, actuator values, speed, payload.
 
         Raises UnreachableError where a point is out of the mechanism's reach.
@@ -55,22 +58,22 @@ class Plan:
         drives = dict(zip(mechanism.parts.columns, values.T, strict=True))
         return table.assign(time_s=self.time_s(), **vector_columns("command", target), **drives)
 
-    def resting(self, settle_s):
+    def resting(self, settle_s: float) -> "Plan":
         """The plan of a robot that waits at every point until it rests, and is read then; itself if it does."""
         moving = any(run.velocity_mm_s.any() for run in self.runs)
         return replace(self, runs=tuple(run.resting(settle_s) for run in self.runs)) if moving else self
 
-    def time_s(self):
+    def time_s(self) -> np.ndarray:
         """Times (n,) of all sampled points since the campaign's start, the rests between the runs included."""
         ends = np.array([run.time_s[-1] + self.dwell_s for run in self.runs])
         starts = np.concatenate([[0.0], np.cumsum(ends)[:-1]])
         return np.concatenate([start + run.time_s for start, run in zip(starts, self.runs, strict=True)])
 
-    def targets(self):
+    def targets(self) -> np.ndarray:
         """Commanded positions (n, 3) of all sampled points in order."""
         return np.concatenate([run.points_mm for run in self.runs])
 
-    def path(self):
+    def path(self) -> tuple[np.ndarray, np.ndarray]:
         """Positions (N, 3) along all that is driven, transfers included, and the rows (n,) of the sampled points.
 
         # ASSUME the robot goes straight from the end of a run to the start of the next.
@@ -78,7 +81,7 @@ class Plan:
         return connect([run.path_mm for run in self.runs], [run.path_index for run in self.runs], 2 * _PATH_STEPS)
 
 
-def connect(paths, rows, steps):
+def connect(paths: Iterable[np.ndarray], rows: Iterable[np.ndarray], steps: int) -> tuple[np.ndarray, np.ndarray]:
     """Positions (N, 3) along paths (k, 3) with straight transfers between them, and where their rows (m,) are in it.
 
     A transfer has `steps` points with its two ends; there is none where a path begins at the end of the one before.
@@ -94,7 +97,9 @@ def connect(paths, rows, steps):
     return np.concatenate(pieces), np.concatenate(index)
 
 
-def make_run(trajectory, speed_mm_s, acceleration_mm_s2, payload_kg=0.0, reverse=False):
+def make_run(
+    trajectory: Trajectory, speed_mm_s: float, acceleration_mm_s2: float, payload_kg: float = 0.0, reverse: bool = False
+) -> Run:
     """One pass along a trajectory, forward or in reverse, with the trapezoidal profile over its arc length."""
     from scipy.interpolate import CubicSpline
 
@@ -123,7 +128,13 @@ def make_run(trajectory, speed_mm_s, acceleration_mm_s2, payload_kg=0.0, reverse
     )
 
 
-def make_plan(trajectories, passes, speed_mm_s, acceleration_mm_s2, dwell_s):
+def make_plan(
+    trajectories: Sequence[Trajectory],
+    passes: Iterable[Mapping[str, Any]],
+    speed_mm_s: float,
+    acceleration_mm_s2: float,
+    dwell_s: float,
+) -> Plan:
     """Plan of a campaign: every pass drives its trajectories one after another.
 
     passes: mappings with the keys `reverse`, `speed_mm_s` and `acceleration_mm_s2` (absent: the campaign's),

@@ -11,7 +11,9 @@ _part = numba.njit(forceinline=True, error_model="numpy")
 
 
 @numba.njit(cache=True, error_model="numpy")
-def descend(rest, left, rotations, iterations, tolerance_rad):
+def descend(
+    rest: np.ndarray, left: np.ndarray, rotations: np.ndarray, iterations: int, tolerance_rad: float
+) -> tuple[np.ndarray, np.ndarray]:
     """Rotations (m, 3, 3) and costs (m,) after at most so many steps of Levenberg's and Marquardt's method each.
 
     The cost of a rotation Q is |rest q - left|^2 of its entries q, with rest (r, 9) and left (r,).
@@ -48,9 +50,9 @@ def descend(rest, left, rotations, iterations, tolerance_rad):
 
 
 @_part
-def _residual(rest, left, at, row):
+def _residual(rest: np.ndarray, left: np.ndarray, at: np.ndarray, row: int) -> float:
     """One residual of a rotation (3, 3)."""
-    off = -left[row]
+    off: float = -left[row]
     for i in range(3):
         for j in range(3):
             off += rest[row, 3 * i + j] * at[i, j]
@@ -58,7 +60,7 @@ def _residual(rest, left, at, row):
 
 
 @_part
-def _cost(rest, left, at):
+def _cost(rest: np.ndarray, left: np.ndarray, at: np.ndarray) -> float:
     """Sum of squared residuals of a rotation (3, 3)."""
     total = 0.0
     for row in range(len(left)):
@@ -67,7 +69,9 @@ def _cost(rest, left, at):
 
 
 @_part
-def _normal_equations(rest, left, at, slopes, normal, gradient):
+def _normal_equations(
+    rest: np.ndarray, left: np.ndarray, at: np.ndarray, slopes: np.ndarray, normal: np.ndarray, gradient: np.ndarray
+) -> None:
     """Normal matrix (3, 3) and gradient (3,) by a small turn, exp(w) Q, of a rotation (3, 3), in place."""
     normal[:], gradient[:] = 0.0, 0.0
     for row in range(len(left)):
@@ -84,7 +88,7 @@ def _normal_equations(rest, left, at, slopes, normal, gradient):
 
 
 @_part
-def _solve(normal, gradient, step):
+def _solve(normal: np.ndarray, gradient: np.ndarray, step: np.ndarray) -> None:
     """The step (3,) of - normal^-1 gradient by Cholesky's factors, which replace the lower triangle of the normal
     matrix (3, 3).
     """
@@ -105,7 +109,7 @@ def _solve(normal, gradient, step):
 
 
 @_part
-def _turned(step, length, turn):
+def _turned(step: np.ndarray, length: float, turn: np.ndarray) -> None:
     """The rotation (3, 3) of a rotation vector (3,), in place, by the unit quaternion."""
     # sin(x / 2) / x of a small x by its series
     share = 0.5 - length**2 / 48.0 + length**4 / 3840.0 if length < 1e-3 else np.sin(0.5 * length) / length

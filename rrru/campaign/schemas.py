@@ -1,10 +1,12 @@
 """Tables of the campaigns."""
 
+from collections.abc import Container
 from dataclasses import replace
 
 from rrru.campaign.measurements import ON_PLATFORM, ON_WORLD
 from rrru.campaign.stated_motion import BETWEEN, KINDS
-from rrru.store.schema import Column, read_tables
+from rrru.kinematics.robot import Robot
+from rrru.store.schema import Column, Table, read_tables
 
 TABLES = read_tables("""
 run                    int    number of the pass, from 1 in the order driven
@@ -131,14 +133,14 @@ _MORE = (
 )
 
 
-def measurement_table(robot, names=()):
+def measurement_table(robot: Robot, names: Container[str] = ()) -> Table:
     """The table `measurements` with a robot's own columns of actuator values, and those of `names` beyond them."""
     table = next(table for table in TABLES if table.name == "measurements")
     first, last = table.names.index("theta1_rad"), table.names.index("theta3_rad") + 1
     drives = robot.parts.drives
     values = [Column(drive.column, "float64", f"commanded actuator value {drive.column}") for drive in drives]
     columns = [*table.columns[:first], *values, *table.columns[last:]]
-    more = {after: [] for after, *_ in _MORE}
+    more: dict[str, list[Column]] = {after: [] for after, *_ in _MORE}
     for after, name, text in _MORE:
         nullable = not name.startswith("target")
         more[after] += [Column(name.format(axis), "float64", f"{text}, {axis}", nullable) for axis in "xyz"]

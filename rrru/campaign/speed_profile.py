@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from rrru.errors import ConfigError
 
@@ -18,23 +19,23 @@ class Trapezoid:
     speed_mm_s: float
     acceleration_mm_s2: float
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if not min(self.length_mm, self.speed_mm_s, self.acceleration_mm_s2) > 0.0:
             motion = f"length {self.length_mm} mm, speed {self.speed_mm_s} mm/s"
             motion += f", acceleration {self.acceleration_mm_s2} mm/s^2"
             raise ConfigError(f"motion: {motion}; allowed: positive numbers")
 
     @property
-    def peak_mm_s(self):
+    def peak_mm_s(self) -> float:
         """Highest speed that is reached."""
-        return min(self.speed_mm_s, np.sqrt(self.length_mm * self.acceleration_mm_s2))
+        return float(min(self.speed_mm_s, np.sqrt(self.length_mm * self.acceleration_mm_s2)))
 
     @property
-    def duration_s(self):
+    def duration_s(self) -> float:
         """Time from rest to rest."""
         return self.length_mm / self.peak_mm_s + self.peak_mm_s / self.acceleration_mm_s2
 
-    def time(self, distance_mm):
+    def time(self, distance_mm: npt.ArrayLike) -> np.ndarray:
         """Times (n,) at which distances (n,) along the path are passed."""
         a, v, length = self.acceleration_mm_s2, self.peak_mm_s, self.length_mm
         distance, ramp = np.clip(np.asarray(distance_mm, dtype=float), 0.0, length), 0.5 * v**2 / a
@@ -45,12 +46,13 @@ class Trapezoid:
         steady = v / a + (distance - ramp) / v
         return np.select([distance < ramp, distance > length - ramp], [speeding_up, slowing_down], steady)
 
-    def speed(self, time_s):
+    def speed(self, time_s: npt.ArrayLike) -> np.ndarray:
         """Speeds (n,) in mm/s at times (n,)."""
         time = np.asarray(time_s, dtype=float)
-        return np.clip(self.acceleration_mm_s2 * np.minimum(time, self.duration_s - time), 0.0, self.peak_mm_s)
+        speed = self.acceleration_mm_s2 * np.minimum(time, self.duration_s - time)
+        return np.asarray(np.clip(speed, 0.0, self.peak_mm_s))
 
-    def acceleration(self, time_s):
+    def acceleration(self, time_s: npt.ArrayLike) -> np.ndarray:
         """Accelerations (n,) along the path in mm/s^2 at times (n,)."""
         time, a = np.asarray(time_s, dtype=float), self.acceleration_mm_s2
         ramp = self.peak_mm_s / a

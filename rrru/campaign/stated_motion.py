@@ -44,13 +44,14 @@ class StatedMotion:
         return self.kind + (f", straight in the {self.between}" if self.between else "")
 
     @classmethod
-    def from_config(cls, value: Any) -> Self:
+    def from_config(cls, value: str | Mapping[str, Any]) -> Self:
         """From the value of a campaign's key: a kind, or a mapping of `kind` and `between`."""
         if not isinstance(value, Mapping):
             return cls(value)
         if unknown := [key for key in value if key not in ("kind", "between")]:
             raise ConfigError(f"motion has the key {unknown[0]!r}; allowed: kind, between")
-        return cls(value.get("kind"), value.get("between"))
+        given: dict[str, Any] = {"kind": None, **value}
+        return cls(**given)
 
     def columns(self) -> dict[str, str]:
         """Columns of a measurement table by name, each of one value, from which `stated_motion` reads it."""

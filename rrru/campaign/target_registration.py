@@ -217,10 +217,10 @@ def _with_turns(matrix: FloatArray, readings: TargetReadings, turn: FloatArray, 
 def _starts(linear: _Eliminated) -> FloatArray:
     """Rotations (m, 3, 3) to start from: a grid of all, and the rotation next to the linear solution."""
     entries = np.asarray(np.linalg.lstsq(linear.rest, linear.left, rcond=1e-9)[0], dtype=float)
-    return np.concatenate([_GRID, _nearest_rotation(entries.reshape(3, 3))[None]])
+    return np.concatenate([_GRID, nearest_rotation(entries.reshape(3, 3))[None]])
 
 
-def _nearest_rotation(matrix: FloatArray) -> FloatArray:
+def nearest_rotation(matrix: FloatArray) -> FloatArray:
     """The rotation (3, 3) nearest to a matrix (3, 3)."""
     left, _, right = np.linalg.svd(matrix)
     return np.asarray(left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right)
@@ -250,7 +250,7 @@ def _completed(readings: TargetReadings, linear: _Eliminated, rotation: FloatArr
     place, tool = readings.place_mm.copy(), np.eye(3)
     place[unknown] = numbers[3 : 3 + 3 * len(unknown)].reshape(-1, 3)
     if len(numbers) > 3 + 3 * len(unknown):
-        tool = _nearest_rotation(numbers[-9:].reshape(3, 3))
+        tool = nearest_rotation(numbers[-9:].reshape(3, 3))
     shift = numbers[:3] - rotation @ linear.centre_mm
     model = readings.body_mm + np.einsum("nij,nj->ni", readings.body_turn, place[readings.target])
     residual = readings.measured_mm @ rotation.T + shift - model

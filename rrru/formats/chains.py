@@ -5,13 +5,15 @@ point, three and two or three of them, and between both nothing or a driven slid
 Lengths in mm, angles in rad.
 """
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from rrru.formats.joint_graph import Move, placed
-from rrru.kinematics.chain import Twists, walk
-from rrru.kinematics.legs import TOOL, WORLD, Bar, Joint, Leg, Z, turn_about
+from rrru.formats.mjcf_reader import Assembly
+from rrru.kinematics.chain import Twists, Walk, walk
+from rrru.kinematics.legs import TOOL, WORLD, Bar, Joint, Leg, Legs, Z, turn_about
 from rrru.kinematics.point_masses import PLATFORM
 from rrru.kinematics.wrenches import rank_of, screw
 
@@ -45,19 +47,22 @@ class Chains:
     of the joint's frame in the Move's.
     """
 
-    def __init__(self, assembly, driven, offsets):
-        self.assembly, self._drives = assembly, {joint: number for number, joint in enumerate(driven)}
-        self._offsets = offsets
+    def __init__(self, assembly: Assembly, driven: Sequence[int], offsets: Mapping[int | None, float]) -> None:
+        self.assembly, self._offsets = assembly, offsets
+        self._drives: dict[int | None, int] = {joint: number for number, joint in enumerate(driven)}
         names = [f"leg {k}" for k in range(1, len(assembly.paths) + 1)] if len(assembly.paths) > 1 else ["arm"]
         self._taken = {WORLD, TOOL, PLATFORM, *(f"{name} {end}" for name in names for end in ("ball", "bar", "end"))}
-        self._made, self.parts, self.legs, self.seats = {}, {}, (), {}
+        self._made: dict[tuple[tuple[int, ...], int], Joint] = {}
+        self.parts: dict[int, Place] = {}
+        self.legs: tuple[Leg, ...] = ()
+        self.seats: dict[str, np.ndarray] = {}
         self.sites = {name: self._unique(name) for name in assembly.moves}
         base = Joint(self._unique("base"))
         for name, path in zip(names, assembly.paths, strict=True):
             self.legs += (self._leg(name, path, base),)
         self._refuse_shared()
 
-    def _unique(self, name):
+    def _unique(self, name: str) -> str:
         """A name of a site that no other has."""
         number, result = 1, name
         while result in self._taken:
@@ -66,7 +71,7 @@ class Chains:
         self._taken.add(result)
         return result
 
-    def _leg(self, name, path, base):
+    def _leg(self, name: str, path: tuple[int, ...], base: Joint) -> Leg:
         """The chain of a path of seams."""
         joints, placement, part = [base], np.eye(4), self.assembly.base
         for number, seam in enumerate(path):
@@ -82,7 +87,7 @@ class Chains:
         end = Joint(self._unique(f"{name} {PLATFORM}"), "fixed", Z, placement[:3, 3], placement[:3, :3])
         return Leg(name, (*joints, end))
 
-    def _joint(self, key, move, placement):
+    def _joint(self, key: tuple[tuple[int, ...], int], move: Move, placement: np.ndarray) -> tuple[Joint, np.ndarray]:
         """The Joint of a Move behind a placement, one for all legs that have it, and the placement behind it.
 
         An axis that is none of its frame's becomes the z of another frame, so that a drive's error is one number.
@@ -104,9 +109,9 @@ class Chains:
             self._made[key] = Joint(self.sites[move.name], move.kind, axis, frame[:3, 3], frame[:3, :3], drive, home)
         return self._made[key], placed(turn=turn.T)
 
-    def _refuse_shared(self):
+    def _refuse_shared(self) -> None:
         """Raise ConfigError for joints that several legs have and cannot."""
-        owners = {}
+        owners: dict[str, list[tuple[str, Joint]]] = {}
         for leg in self.legs:
             for joint in leg.joints:
                 owners.setdefault(joint.name, []).append((leg.name, joint))
@@ -117,7 +122,7 @@ class Chains:
                 raise self.assembly.error(f"{text} platform")
 
 
-def with_bars(legs):
+def with_bars(legs: Legs) -> tuple[tuple[Leg, ...], dict[int, Cut]]:
     """The legs of Legs at the home pose, ended in bars where possible, and the Cuts of these by number."""
     actuators, passive = legs.home_drives[None], legs.home_passive[None]
     ways = [walk(legs, leg, actuators, passive, Twists(legs)) for leg in legs.legs]
@@ -127,7 +132,7 @@ def with_bars(legs):
     return tuple(leg for leg, _ in pairs), {number: cut for number, (_, cut) in enumerate(pairs) if cut}
 
 
-def _with_bar(leg, way, drives):
+def _with_bar(leg: Leg, way: Walk, drives: np.ndarray) -> tuple[Leg, Cut | None]:
     """A leg as one that ends in a bar and its Cut, None if it does not; way: its Walk at the driven values `drives`."""
     first = next((k for k, joint in enumerate(leg.joints) if joint.passive), None)
     tail = range(first or 0, len(leg.joints) - 1)
@@ -157,7 +162,7 @@ def _with_bar(leg, way, drives):
     return leg, None
 
 
-def _meeting(way, joints):
+def _meeting(way: Walk, joints: Sequence[int]) -> np.ndarray | None:
     """The point (3,) in which the axes of two or three joints meet, None if they do not."""
     if len(joints) not in (2, 3):
         return None

@@ -4,12 +4,14 @@ A follower's value is an offset and a factor times that of its driver. MuJoCo co
 configuration, as `rrru.formats.mjcf_reader` does. Lengths in mm, angles in rad.
 """
 
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 
 import mujoco
 import numpy as np
 
-from rrru.formats.mjcf_reader import MM
+from rrru.formats.mjcf_reader import MM, Assembly
+from rrru.formats.urdf_reader import Mimic
 
 _EQ, _SLIDE = mujoco.mjtEq, mujoco.mjtJoint.mjJNT_SLIDE
 
@@ -23,13 +25,13 @@ class Follows:
     offset: float
 
 
-def of_mimics(assembly, mimics):
+def of_mimics(assembly: Assembly, mimics: Mapping[str, Mimic]) -> dict[int, Follows]:
     """Follows by MuJoCo's joint from mimics {joint's name: (driver's name, factor, offset)} of a URDF, m and rad.
 
     Raises ConfigError for the mimic of a mimic and of a joint that is not on the chain.
     """
-    on_chain = {move.origin: move.joint for move in assembly.moves.values()}
-    result = {}
+    on_chain = {move.origin: move.joint for move in assembly.moves.values() if move.joint is not None}
+    result: dict[int, Follows] = {}
     for name, (driver, factor, offset) in mimics.items():
         if name not in on_chain:
             continue
@@ -40,14 +42,15 @@ def of_mimics(assembly, mimics):
     return result
 
 
-def of_equalities(assembly, driven):
+def of_equalities(assembly: Assembly, driven: Collection[int]) -> dict[int, Follows]:
     """Follows by MuJoCo's joint from the active joint equalities of an MJCF's legs; driven: joints with actuators.
 
     Raises ConfigError for a follower of a joint without actuator, with an actuator of its own, or along a curve.
     """
-    model, result = assembly.model, {}
+    model = assembly.model
+    result: dict[int, Follows] = {}
     of_legs = {move.joint for move in assembly.moves.values()}
-    for k in np.flatnonzero(model.eq_active0):
+    for k in np.flatnonzero(model.eq_active0).tolist():
         joint, driver = int(model.eq_obj1id[k]), int(model.eq_obj2id[k])
         if model.eq_type[k] != _EQ.mjEQ_JOINT or joint not in of_legs:
             continue
@@ -66,14 +69,14 @@ def of_equalities(assembly, driven):
     return result
 
 
-def coupling(driven, follows):
+def coupling(driven: Iterable[int], follows: Mapping[int, Follows]) -> np.ndarray | None:
     """The coupling (D, K) of Legs whose driven values are those of the driven joints, then of the followers."""
     number = {joint: k for k, joint in enumerate(driven)}
     rows = [[one.factor * (number[one.driver] == k) for k in range(len(number))] for one in follows.values()]
     return np.array([*np.eye(len(number)), *rows]) if rows else None
 
 
-def _follows(model, joint, driver, factor, offset):
+def _follows(model: mujoco.MjModel, joint: int, driver: int, factor: float, offset: float) -> Follows:
     """The Follows of numbers in m and rad."""
     unit, driver_unit = (MM if model.jnt_type[number] == _SLIDE else 1.0 for number in (joint, driver))
     return Follows(driver, factor * unit / driver_unit, offset * unit)

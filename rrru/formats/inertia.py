@@ -9,26 +9,28 @@ across.
 Lengths in mm, masses in kg.
 """
 
+import mujoco
 import numpy as np
 
+from rrru.formats.chains import Chains, Place
 from rrru.formats.joint_graph import placed, turn_of, undone
 from rrru.formats.mjcf_reader import MM
 from rrru.formats.urdf_reader import NO_MASS_KG
-from rrru.kinematics.chain import Twists, walk
-from rrru.kinematics.legs import turn_about
+from rrru.kinematics.chain import Twists, Walk, walk
+from rrru.kinematics.legs import Bar, Leg, Legs, turn_about
 from rrru.kinematics.point_masses import PLATFORM, PointMass
 
 
-def points_of(model, body):
+def points_of(model: mujoco.MjModel, body: int) -> np.ndarray:
     """Points (6, 3) in mm in a body's frame, each of a sixth of its mass, that have its centre and inertia."""
     mass, inertia = model.body_mass[body], model.body_inertia[body]
     # triangle inequalities may be missed by rounding
     second = np.maximum(0.5 * inertia.sum() - inertia, 0.0)
     arms = turn_of(model.body_iquat[body]) * np.sqrt(3.0 * second / mass)
-    return MM * (model.body_ipos[body] + np.concatenate([arms.T, -arms.T]))
+    return np.asarray(MM * (model.body_ipos[body] + np.concatenate([arms.T, -arms.T])))
 
 
-def point_masses_of(chains, open_legs, legs):
+def point_masses_of(chains: Chains, open_legs: Legs, legs: Legs) -> tuple[PointMass, ...]:
     """PointMasses of all bodies that move with Legs; open_legs: the same ones without bars."""
     assembly, result = chains.assembly, []
     for body in range(1, assembly.model.nbody):
@@ -44,13 +46,13 @@ def point_masses_of(chains, open_legs, legs):
         place = chains.parts[part]
         at, leg = _moved(place.placement, at), legs.legs[place.leg]
         if leg.bar and place.joint >= len(leg.joints) - 1:
-            result += _of_bar(open_legs, legs, place, mass, at)
+            result += _of_bar(open_legs, legs, place, leg.bar, mass, at)
         else:
             result += [PointMass(leg.joints[place.joint].name, mass / 6.0, point) for point in at]
     return tuple(result)
 
 
-def _holder(chains, body):
+def _holder(chains: Chains, body: int) -> int | None:
     """The body, or the parent of it at home, that is part of a leg; None for a body that is fixed or loose."""
     assembly = chains.assembly
     while body and assembly.frames[body][0] not in (assembly.base, *chains.parts):
@@ -58,18 +60,18 @@ def _holder(chains, body):
     return body if assembly.frames[body][0] in chains.parts else None
 
 
-def _moved(placement, points):
+def _moved(placement: np.ndarray, points: np.ndarray) -> np.ndarray:
     """Points (n, 3) behind a placement."""
-    return points @ placement[:3, :3].T + placement[:3, 3]
+    return np.asarray(points @ placement[:3, :3].T + placement[:3, 3])
 
 
-def _of_bar(open_legs, legs, place, mass, at):
-    """Two PointMasses of a body of a bar whose points (6, 3) are at a Place of the leg without the bar."""
+def _of_bar(open_legs: Legs, legs: Legs, place: Place, bar: Bar, mass: float, at: np.ndarray) -> list[PointMass]:
+    """Two PointMasses of a body of a Bar whose points (6, 3) are at a Place of the leg without the bar."""
     chain, leg = open_legs.legs[place.leg], legs.legs[place.leg]
     actuators, passive = open_legs.home_drives[None], open_legs.home_passive[None]
     way = walk(open_legs, chain, actuators, passive, Twists(open_legs))
     near = walk(legs, leg, actuators, legs.home_passive[None], Twists(legs)).place[0]
-    far = way.place[0] + way.turn[0] @ leg.bar.platform_mm
+    far = way.place[0] + way.turn[0] @ bar.platform_mm
     line = (far - near) / np.linalg.norm(far - near)
     spots = _moved(_behind(open_legs, chain, way, place.joint), at)
     slides = [k for k, joint in enumerate(chain.joints) if joint.kind == "P" and k >= len(leg.joints) - 1]
@@ -82,7 +84,7 @@ def _of_bar(open_legs, legs, place, mass, at):
     return [PointMass(site, 0.5 * mass, np.array([centre + side * arm, 0.0, 0.0])) for side in (1.0, -1.0)]
 
 
-def _behind(legs, chain, way, number):
+def _behind(legs: Legs, chain: Leg, way: Walk, number: int) -> np.ndarray:
     """Placement behind the motion of a joint of a chain in the home pose, way: its Walk."""
     joint, turn, place = chain.joints[number], way.turns[number][0], way.places[number][0]
     value = joint.home if joint.drive is None else legs.driven(legs.home_drives)[joint.drive]

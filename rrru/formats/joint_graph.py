@@ -4,8 +4,10 @@ Lengths in mm, angles in rad.
 """
 
 from dataclasses import dataclass, replace
+from typing import TypeAlias
 
 import numpy as np
+import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
 
@@ -24,6 +26,10 @@ class Move:
     home: float = 0.0
 
 
+# what a seam has in a row: a placement (4, 4) or a freedom
+Item: TypeAlias = np.ndarray | Move
+
+
 @dataclass(frozen=True, eq=False)
 class Seam:
     """An edge of the graph: placements and Moves, in their order from the part `near` to the part `far`.
@@ -33,15 +39,22 @@ class Seam:
 
     near: int
     far: int
-    items: tuple
+    items: tuple[Item, ...]
     body: int | None = None
-    connects: tuple = ()
+    connects: tuple[int, ...] = ()
 
-    def other(self, part):
+    def other(self, part: int) -> int:
         """The other one of both parts."""
         return self.far if part == self.near else self.near
 
-    def items_from(self, part):
+    def placement(self, number: int) -> np.ndarray:
+        """The item of a number, which is a placement, as the first and the last one are."""
+        item = self.items[number]
+        if isinstance(item, Move):
+            raise TypeError(f"item {number} of a seam is {item.name}; allowed: a placement")
+        return item
+
+    def items_from(self, part: int) -> tuple[Item, ...]:
         """The items in their order from one of both parts to the other."""
         if part == self.near:
             return self.items
@@ -51,7 +64,7 @@ class Seam:
         )
 
 
-def placed(shift_mm=(0.0, 0.0, 0.0), turn=None):
+def placed(shift_mm: npt.ArrayLike = (0.0, 0.0, 0.0), turn: np.ndarray | None = None) -> np.ndarray:
     """The placement of a shift (3,) and a turn (3, 3)."""
     result = np.eye(4)
     result[:3, 3] = shift_mm
@@ -60,12 +73,12 @@ def placed(shift_mm=(0.0, 0.0, 0.0), turn=None):
     return result
 
 
-def undone(placement):
+def undone(placement: np.ndarray) -> np.ndarray:
     """The inverse of a placement."""
     turn = placement[:3, :3].T
     return placed(-turn @ placement[:3, 3], turn)
 
 
-def turn_of(quaternion):
+def turn_of(quaternion: np.ndarray) -> np.ndarray:
     """Rotation matrix (3, 3) of MuJoCo's quaternion (4,), of any length."""
-    return Rotation.from_quat(quaternion, scalar_first=True).as_matrix()
+    return np.asarray(Rotation.from_quat(quaternion, scalar_first=True).as_matrix())

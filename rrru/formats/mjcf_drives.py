@@ -6,10 +6,16 @@ servo has to overcome it: a drive turns back by the backlash and 2 F / kp before
 their sum. Where friction alone winds up more than w, the file has no backlash, and F = w kp / 2.
 """
 
+from collections.abc import Mapping
+from xml.etree.ElementTree import Element
+
 import mujoco
 import numpy as np
 
+from rrru.formats.file_changes import Found
 from rrru.formats.mjcf_reader import MM
+from rrru.formats.mjcf_text import MjcfDocument
+from rrru.formats.structure import Structure
 from rrru.formats.xml_text import sizes, words
 
 _SERVOS = ("position", "general")
@@ -22,17 +28,15 @@ _DRAGS = {"R": 2.0, "P": 1.0}
 _NONE = dict.fromkeys(("ref", "springref", "stiffness", "damping", "frictionloss", "margin"), "0")
 
 
-def write_stiffness(document, structure, found):
+def write_stiffness(document: MjcfDocument, structure: Structure, found: Found) -> list[str]:
     """Write the stiffness of the drives' servos into a document; returns what it cannot represent, in words."""
     model, lost = structure.assembly.model, []
     ratio = any("dampratio" in one.attrib for one in document.root.iter())
     for number, (compliance, error) in found.compliance.items():
         if not compliance > 0.0:
             continue
-        move = structure.driven[number]
-        servos = [
-            k for k in range(model.nu) if _is_servo(model, k, move.joint) and document.actuators[k].tag in _SERVOS
-        ]
+        move, joint = structure.driven[number], structure.joints[number]
+        servos = [k for k in range(model.nu) if _is_servo(model, k, joint) and document.actuators[k].tag in _SERVOS]
         if len(servos) != 1:
             lost.append(f"compliance of {move.origin}: it has {len(servos)} position servos, not one")
             continue
@@ -53,73 +57,81 @@ def write_stiffness(document, structure, found):
     return lost
 
 
-def _is_servo(model, k, joint):
+def _is_servo(model: mujoco.MjModel, k: int, joint: int) -> bool:
     """Whether an actuator is a position servo of a joint."""
     return bool(
         model.actuator_trnid[k, 0] == joint and model.actuator_biasprm[k, 1] == -model.actuator_gainprm[k, 0] != 0.0
     )
 
 
-def write_backlash(document, structure, found, lines):
+def write_backlash(
+    document: MjcfDocument, structure: Structure, found: Found, lines: Mapping[int, tuple[np.ndarray, np.ndarray]]
+) -> None:
     """Write the lost motion of drives into a document; lines: (axis, point in mm) of changed joints, by joint."""
     inertia = _inertia(structure.assembly.model)
     for number, (width, error) in found.play.items():
         if not width > 0.0:
             continue
-        move = structure.driven[number]
+        move, joint = structure.driven[number], structure.joints[number]
         for tag in ("joint", "fixed"):
             # the file may have been corrected before
             document.drop(tag, f"{move.origin}_play")
         # to m and N m, or rad and N
         scale, force, unit = (1.0, 1.0 / MM, "rad") if move.kind == "R" else (1.0 / MM, 1.0, "m")
-        load = max(force * found.loads.get(number, 0.0), _DRAGS[move.kind] * inertia[move.joint])
+        load = max(force * found.loads.get(number, 0.0), _DRAGS[move.kind] * inertia[joint])
         lost, holding = scale * width, _HOLDS * load
         stiffness = _stiffness(structure, found, number)
         backlash = lost - 2.0 * holding / stiffness
         text = f"lost motion of {lost:.4g} +- {sizes(scale * error)} {unit} at {move.origin}"
         hard = {"solreffriction": _hard(structure), "solimpfriction": _STIFF}
         if backlash <= 0.0:
-            element = document.joints[move.joint]
+            element = document.joints[joint]
             element.attrib |= hard | {"frictionloss": words(0.5 * lost * stiffness)}
             document.note(element, f"found: {text}, less than the wind-up by friction against its load: friction alone")
             continue
-        line = lines.get(move.joint, _line(structure, move.joint))
-        element = _write_joint(document, structure, (move, line, backlash), inertia[move.joint])
+        line = lines.get(joint, _line(structure, joint))
+        element = _write_joint(document, structure, (number, line, backlash), inertia[joint])
         document.note(element, f"found: {text}, of which friction on the arm winds up {lost - backlash:.2g}")
         section = document.root.find("tendon")
         section = document.inside(document.root, "tendon", {}) if section is None else section
-        tendon = {"name": f"{move.origin}_play", "frictionloss": words(holding)}
-        tendon = document.inside(section, "fixed", tendon | hard)
+        attributes = {"name": f"{move.origin}_play", "frictionloss": words(holding)}
+        tendon = document.inside(section, "fixed", attributes | hard)
         document.note(tendon, f"assumed: {_HOLDS:g} times the largest load, or inertia, holds the arm within backlash")
         for name in (move.origin, f"{move.origin}_play"):
             document.inside(tendon, "joint", {"joint": name, "coef": "1"})
 
 
-def _stiffness(structure, found, number):
+def _stiffness(structure: Structure, found: Found, number: int) -> float:
     """Stiffness of a drive in the corrected file, N m/rad or N/m, inf where it has no compliant servo."""
     model, move = structure.assembly.model, structure.driven[number]
     compliance, _ = found.compliance.get(number, (0.0, 0.0))
     if compliance > 0.0:
         return (1.0 / MM if move.kind == "R" else MM) / compliance
-    gains = [model.actuator_gainprm[k, 0] for k in range(model.nu) if _is_servo(model, k, move.joint)]
+    gains = [model.actuator_gainprm[k, 0] for k in range(model.nu) if _is_servo(model, k, structure.joints[number])]
     return sum(gains) or np.inf
 
 
-def _line(structure, joint):
+def _line(structure: Structure, joint: int) -> tuple[np.ndarray, np.ndarray]:
     """Axis and point in mm of a joint in the file as it came."""
     return structure.assembly.model.jnt_axis[joint], MM * structure.assembly.model.jnt_pos[joint]
 
 
-def _hard(structure):
+def _hard(structure: Structure) -> str:
     """A solref as stiff as the file's step allows."""
     return words([2.0 * structure.assembly.model.opt.timestep, 1.0])
 
 
-def _write_joint(document, structure, what, inertia):
-    """Write a joint with a range behind a driven one; what: its Move, line (axis, point in mm) and backlash."""
-    (move, (axis, point), backlash), model = what, structure.assembly.model
+def _write_joint(
+    document: MjcfDocument,
+    structure: Structure,
+    what: tuple[int, tuple[np.ndarray, np.ndarray], float],
+    inertia: float,
+) -> Element:
+    """Write a joint with a range behind a driven one; what: drive, line (axis, point in mm), backlash."""
+    (number, (axis, point), backlash), model = what, structure.assembly.model
+    move, joint = structure.driven[number], structure.joints[number]
     half = 0.5 * backlash * (np.degrees(1.0) if move.kind == "R" and document.degrees else 1.0)
-    own_rotor = model.dof_armature[model.jnt_dofadr[move.joint]] > 0.0
+    own_rotor = model.dof_armature[model.jnt_dofadr[joint]] > 0.0
     attributes = {
         "name": f"{move.origin}_play",
         "type": "hinge" if move.kind == "R" else "slide",
@@ -131,12 +143,12 @@ def _write_joint(document, structure, what, inertia):
         "solreflimit": _hard(structure),
         "solimplimit": _STIFF,
     }
-    return document.behind(document.joints[move.joint], "joint", attributes | _NONE)
+    return document.behind(document.joints[joint], "joint", attributes | _NONE)
 
 
-def _inertia(model):
+def _inertia(model: mujoco.MjModel) -> np.ndarray:
     """Inertia (joints,) about or along each joint in the reference configuration, kg m^2 or kg."""
     data, matrix = mujoco.MjData(model), np.zeros((model.nv, model.nv))
     mujoco.mj_forward(model, data)
     mujoco.mj_fullM(model, data, matrix)
-    return np.diag(matrix)[model.jnt_dofadr]
+    return np.asarray(np.diag(matrix)[model.jnt_dofadr])

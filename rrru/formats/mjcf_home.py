@@ -3,16 +3,19 @@
 Newton on the equalities with the driven joints held:  J dq = -r,  the smallest dq. m and rad.
 """
 
+from collections.abc import Collection, Iterable
+
 import mujoco
 import numpy as np
 
 from rrru.formats.mjcf_reader import backlash_joints
+from rrru.formats.mjcf_text import MjcfDocument
 from rrru.formats.xml_text import own_children, words
 
 _STEPS, _CLOSED_M = 30, 1e-12
 
 
-def closed_qpos(model, qpos, held):
+def closed_qpos(model: mujoco.MjModel, qpos: np.ndarray, held: Collection[int]) -> np.ndarray:
     """The qpos (nq,) next to one at which all equalities of a model hold, joints `held` as they are."""
     model.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
     data, free = mujoco.MjData(model), np.ones(model.nv, dtype=bool)
@@ -28,10 +31,10 @@ def closed_qpos(model, qpos, held):
         slope, change = data.efc_J.reshape(-1, model.nv)[: data.ne, free], np.zeros(model.nv)
         change[free] = -np.linalg.lstsq(slope, lack, rcond=1e-9)[0]
         mujoco.mj_integratePos(model, data.qpos, change, 1.0)
-    return data.qpos.copy()
+    return np.array(data.qpos)
 
 
-def close_keys(document, before, driven, model):
+def close_keys(document: MjcfDocument, before: mujoco.MjModel, driven: Iterable[str], model: mujoco.MjModel) -> None:
     """Write the keyframes of a document whose file had the model `before` and now has another one.
 
     driven: names of the driven joints, which stay where they are. Where there is no keyframe and loops stand open, a
@@ -51,7 +54,9 @@ def close_keys(document, before, driven, model):
         document.inside(section, "key", {"name": "corrected", "qpos": words(qpos)})
 
 
-def _carried(before, model, values, address, default):
+def _carried(
+    before: mujoco.MjModel, model: mujoco.MjModel, values: np.ndarray, address: str, default: np.ndarray
+) -> np.ndarray:
     """Values per joint of one model as those of another, which has more joints; these have the default's."""
     result, old = np.array(default), {before.joint(j).name for j in range(before.njnt)}
     common = [j for j in range(model.njnt) if not model.joint(j).name or model.joint(j).name in old]

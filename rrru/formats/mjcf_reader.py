@@ -6,13 +6,15 @@ the platform. Values of joints count from the file's reference configuration (Mu
 joints, three turns about x, y and z, from the home pose. Lengths in mm, angles in rad; placements are (4, 4).
 """
 
+from collections.abc import Sequence
 from functools import cached_property
+from pathlib import Path
 
 import mujoco
 import numpy as np
 
 from rrru.errors import ConfigError
-from rrru.formats.joint_graph import Move, Seam, placed, turn_of, undone
+from rrru.formats.joint_graph import Item, Move, Seam, placed, turn_of, undone
 from rrru.kinematics.legs import X, Y, Z
 
 MM = 1000.0
@@ -21,7 +23,7 @@ _EQ, _JOINT = mujoco.mjtEq, mujoco.mjtJoint
 _SAME = 1e-9
 
 
-def backlash_joints(model):
+def backlash_joints(model: mujoco.MjModel) -> dict[int, int]:
     """Joints that model the backlash of driven ones: same body, kind and line, with a range and without an actuator.
 
     A robot is read with these joints in the middle of their ranges. Returns the driven joint by joint.
@@ -39,7 +41,7 @@ def backlash_joints(model):
     return result
 
 
-def _on_one_line(model, joint, other):
+def _on_one_line(model: mujoco.MjModel, joint: int, other: int) -> bool:
     """Whether two joints of a body move about or along one line."""
     axis, apart = model.jnt_axis[other], model.jnt_pos[joint] - model.jnt_pos[other]
     slides = model.jnt_type[joint] == _JOINT.mjJNT_SLIDE
@@ -47,7 +49,7 @@ def _on_one_line(model, joint, other):
     return bool(np.linalg.norm(np.cross(axis, model.jnt_axis[joint])) < _SAME and off < _SAME)
 
 
-def ends_of(model, k):
+def ends_of(model: mujoco.MjModel, k: int) -> tuple[int, np.ndarray, int, np.ndarray]:
     """Both bodies of a connect or weld, and the placements on them that it holds together."""
     data = model.eq_data[k]
     first, second = int(model.eq_obj1id[k]), int(model.eq_obj2id[k])
@@ -67,9 +69,9 @@ class Assembly:
     none is stated.
     """
 
-    def __init__(self, model, file, base, platform, qpos):
+    def __init__(self, model: mujoco.MjModel, file: Path, base: int, platform: int, qpos: np.ndarray) -> None:
         self.model, self.file, self.base, self.platform = model, file, base, platform
-        self.limits = {}
+        self.limits: dict[int, tuple[float, float]] = {}
         self.data = mujoco.MjData(model)
         self.data.qpos[:] = qpos
         mujoco.mj_kinematics(model, self.data)
@@ -77,7 +79,8 @@ class Assembly:
         self.frames = self._frames([k for k, kind in kinds.items() if kind == _EQ.mjEQ_WELD])
         if self.frames[platform][0] == base:
             raise self.error(f"body {self.body_name(platform)} is fixed to the base; allowed: a body that moves")
-        self._names, self._backlash_joints = set(), backlash_joints(model)
+        self._names: set[str] = set()
+        self._backlash_joints = backlash_joints(model)
         connects = [k for k, kind in kinds.items() if kind == _EQ.mjEQ_CONNECT]
         self.seams = tuple(self._joint_seams() + self._connect_seams(connects))
         for k, kind in kinds.items():
@@ -85,35 +88,35 @@ class Assembly:
                 name = _EQ(kind).name.removeprefix("mjEQ_").lower()
                 raise self.error(f"equality {self.eq_name(k)} is of the kind {name}; allowed: connect, weld, joint")
 
-    def error(self, text):
+    def error(self, text: str) -> ConfigError:
         """The ConfigError of a text about the file."""
         return ConfigError(f"{self.file}: {text}")
 
-    def body_name(self, body):
+    def body_name(self, body: int) -> str:
         """Name of a body."""
         return self.model.body(body).name or f"body {body}"
 
-    def joint_name(self, joint):
+    def joint_name(self, joint: int) -> str:
         """Name of a joint, if it has none from its body's."""
         body = int(self.model.jnt_bodyid[joint])
         number = joint - int(self.model.body_jntadr[body]) + 1
         return self.model.joint(joint).name or f"{self.body_name(body)} joint {number}"
 
-    def eq_name(self, k):
+    def eq_name(self, k: int) -> str:
         """Name of an equality."""
         return self.model.eq(k).name or f"equality {k + 1}"
 
-    def home_of(self, body):
+    def home_of(self, body: int) -> np.ndarray:
         """Placement of a body at home in MuJoCo's world."""
         return placed(MM * self.data.xpos[body], self.data.xmat[body].reshape(3, 3))
 
-    def own(self, body):
+    def own(self, body: int) -> np.ndarray:
         """Placement of a body in its parent's, joints at zero."""
         return placed(MM * self.model.body_pos[body], turn_of(self.model.body_quat[body]))
 
-    def _frames(self, welds):
+    def _frames(self, welds: Sequence[int]) -> dict[int, tuple[int, np.ndarray]]:
         """Part and placement there of every body, the parts named after base and platform first."""
-        near = {body: [] for body in range(self.model.nbody)}
+        near: dict[int, list[tuple[int, np.ndarray]]] = {body: [] for body in range(self.model.nbody)}
         fixed = [(int(self.model.body_parentid[b]), b, self.own(b)) for b in near if b and self._jointless(b)]
         for k in welds:
             first, at_first, second, at_second = ends_of(self.model, k)
@@ -130,11 +133,11 @@ class Assembly:
                     todo += [(other, placement @ there) for other, there in near[body]]
         return result
 
-    def _jointless(self, body):
+    def _jointless(self, body: int) -> bool:
         """Whether a body is fixed to its parent."""
-        return self.model.body_jntnum[body] == 0
+        return bool(self.model.body_jntnum[body] == 0)
 
-    def _joint_seams(self):
+    def _joint_seams(self) -> list[Seam]:
         """Seams of the bodies' joints; a free body has none."""
         result, model = [], self.model
         for body in range(1, model.nbody):
@@ -149,7 +152,7 @@ class Assembly:
                 result.append(Seam(near, far, (*items, undone(after)), body))
         return result
 
-    def _joint_items(self, joint):
+    def _joint_items(self, joint: int) -> list[Item]:
         """Placements and Moves of one joint, in its body's frame."""
         model, name, kind = self.model, self.joint_name(joint), self.model.jnt_type[joint]
         at, address = MM * model.jnt_pos[joint], int(model.jnt_qposadr[joint])
@@ -160,9 +163,9 @@ class Assembly:
             return [placed(at), Move(self._unique(name), "P", axis, name, joint, MM * value), placed(-at)]
         return [placed(at), Move(self._unique(name), "R", axis, name, joint, value), placed(-at)]
 
-    def _connect_seams(self, connects):
+    def _connect_seams(self, connects: Sequence[int]) -> list[Seam]:
         """Seams of connects, those of the same two parts taken together."""
-        groups = {}
+        groups: dict[tuple[int, int], list[tuple[int, np.ndarray, np.ndarray]]] = {}
         for k in connects:
             first, at_first, second, at_second = ends_of(self.model, k)
             (near, before), (far, after) = self.frames[first], self.frames[second]
@@ -172,11 +175,11 @@ class Assembly:
             if near != far:
                 groups.setdefault((near, far), []).append((k, near_mm, far_mm))
         return [
-            Seam(*parts, tuple(self._connect_items(*parts, group)), connects=tuple(k for k, *_ in group))
-            for parts, group in groups.items()
+            Seam(near, far, tuple(self._connect_items(near, far, group)), connects=tuple(k for k, *_ in group))
+            for (near, far), group in groups.items()
         ]
 
-    def _connect_items(self, near, far, group):
+    def _connect_items(self, near: int, far: int, group: Sequence[tuple[int, np.ndarray, np.ndarray]]) -> list[Item]:
         """Placements and Moves of all connects (number, point of near, point of far) of two parts."""
         turn = (undone(self.home_of(near)) @ self.home_of(far))[:3, :3]
         (first, near_mm, far_mm), *further = group
@@ -198,17 +201,17 @@ class Assembly:
         return [placed(near_mm), Move(self._unique(name), "R", along, name), placed(turn=turn), placed(-far_mm)]
 
     @cached_property
-    def moves(self):
+    def moves(self) -> dict[str, Move]:
         """Moves of all paths by name."""
         items = [item for path in self.paths for number in path for item in self.seams[number].items]
         return {item.name: item for item in items if isinstance(item, Move)}
 
     @cached_property
-    def paths(self):
+    def paths(self) -> list[tuple[int, ...]]:
         """Paths of seams from the base to the platform that meet no part twice, in the order of their constraints."""
         result, target = [], self.frames[self.platform][0]
 
-        def go(part, met, path):
+        def go(part: int, met: set[int], path: tuple[int, ...]) -> None:
             if part == target:
                 result.append(path)
                 return
@@ -219,16 +222,18 @@ class Assembly:
         go(self.base, {self.base}, ())
         return sorted(result, key=lambda path: (tuple(n for n in path if self._closes(n)), path))
 
-    def names_along(self, path):
+    def names_along(self, path: tuple[int, ...]) -> tuple[str, ...]:
         """Names of the joints and connects along a path."""
         items = [item for number in path for item in self.seams[number].items]
         return tuple(dict.fromkeys(item.origin for item in items if isinstance(item, Move)))
 
-    def _closes(self, number):
+    def _closes(self, number: int) -> bool:
         """Whether a seam is one of connects."""
         return all(move.joint is None for move in self.seams[number].items if isinstance(move, Move))
 
-    def _ball_items(self, name, near_mm, turn, far_mm, joint=None):
+    def _ball_items(
+        self, name: str, near_mm: np.ndarray, turn: np.ndarray, far_mm: np.ndarray, joint: int | None = None
+    ) -> list[Item]:
         """Placements and Moves of a ball joint between two points, at home turned by `turn`."""
         moves = [
             Move(self._unique(f"{name} {letter}"), "R", axis, name, joint)
@@ -236,7 +241,7 @@ class Assembly:
         ]
         return [placed(near_mm), *moves, placed(turn=turn), placed(-far_mm)]
 
-    def _unique(self, name):
+    def _unique(self, name: str) -> str:
         """A name that no other Move has."""
         while name in self._names:
             name += "'"

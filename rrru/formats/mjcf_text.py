@@ -2,7 +2,9 @@
 
 import os
 from copy import deepcopy
+from pathlib import Path
 from xml.etree import ElementTree
+from xml.etree.ElementTree import Element
 
 import mujoco
 
@@ -20,7 +22,7 @@ class MjcfDocument(Document):
     file's angles are in degrees. Raises ConfigError for a file whose bodies do not all stand in it as such.
     """
 
-    def __init__(self, file):
+    def __init__(self, file: Path) -> None:
         super().__init__(file)
         self._file, root = file, self.root
         if refused := next((one.tag for one in root.iter() if one.tag in _REFUSED), None):
@@ -34,7 +36,7 @@ class MjcfDocument(Document):
         angles = [one.get("angle") for one in root.findall("compiler") if one.get("angle")]
         self.degrees = angles[-1:] != ["radian"]
 
-    def _find_assets(self):
+    def _find_assets(self) -> None:
         """Have files that the file names found from anywhere."""
         self._folders, folder = {}, self._file.resolve().parent
         if not any("file" in one.attrib for one in self.root.iter()):
@@ -46,12 +48,12 @@ class MjcfDocument(Document):
             self._folders[key] = folder / self._compiler.get(key, common)
             self._compiler.set(key, str(self._folders[key]))
 
-    def move_to(self, folder):
+    def move_to(self, folder: Path) -> None:
         """Have files that the file names found from a folder."""
         for key, place in self._folders.items():
             self._compiler.set(key, os.path.relpath(place, folder))
 
-    def site(self, body, name, attributes):
+    def site(self, body: int, name: str, attributes: dict[str, str]) -> Element:
         """The site of a name with these attributes, put on a body by number where there is none."""
         for one in self.root.iter("site"):
             if one.get("name") == name:
@@ -59,12 +61,12 @@ class MjcfDocument(Document):
                 return one
         return self.inside(self.bodies[body], "site", {"name": name} | attributes)
 
-    def drop(self, tag, name):
+    def drop(self, tag: str, name: str) -> None:
         """Remove elements of a name."""
         for one in [one for one in self.root.iter(tag) if one.get("name") == name]:
             self.parent(one).remove(one)
 
-    def compiled(self):
+    def compiled(self) -> mujoco.MjModel:
         """The MjModel of the file as it is now, without keyframes."""
         root = deepcopy(self.root)
         for section in root.findall("keyframe"):

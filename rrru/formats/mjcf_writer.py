@@ -4,23 +4,31 @@ Names, defaults and comments of the user's file stay, and each changed number ha
 Lengths in mm and angles in rad, m in the file.
 """
 
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TypeAlias
+from xml.etree.ElementTree import Element
+
 import mujoco
 import numpy as np
 
-from rrru.formats.file_changes import MEASURED_TOOL, SAME, changes_of, difference, scatter
+from rrru.formats.file_changes import MEASURED_TOOL, SAME, Found, TwistsBySite, changes_of, difference, scatter
 from rrru.formats.mjcf_drives import write_backlash, write_stiffness
 from rrru.formats.mjcf_home import close_keys
 from rrru.formats.mjcf_reader import MM, ends_of
 from rrru.formats.mjcf_text import MjcfDocument
 from rrru.formats.robot_file import mjcf_parts
-from rrru.formats.structure import structure_of
+from rrru.formats.structure import Structure, structure_of
 from rrru.formats.xml_text import quaternion, sizes, words
 
 _TURNS = ("quat", "axisangle", "xyaxes", "zaxis", "euler")
 _EQ = mujoco.mjtEq
+# what numbers of the file are of: ("body", its number), ("axis" or "pos", joint), ("anchor", equality, its end), or
+# ("frame", name)
+_Key: TypeAlias = tuple[str, int] | tuple[str, int, int] | tuple[str, str]
 
 
-def to_mjcf(path, platform, found, folder):
+def to_mjcf(path: str | Path, platform: str, found: Found, folder: Path) -> tuple[str, tuple[str, ...]]:
     """The text of an MJCF with the Found of its robot, for a file in a folder, and what it cannot represent, in words.
 
     Raises ConfigError for a file whose bodies do not all stand in it as such.
@@ -28,7 +36,7 @@ def to_mjcf(path, platform, found, folder):
     structure = structure_of(*mjcf_parts(path, platform))
     document, model = MjcfDocument(structure.assembly.file), structure.assembly.model
 
-    def numbers(twists):
+    def numbers(twists: TwistsBySite) -> dict[_Key, np.ndarray]:
         return _numbers(structure, found, twists)
 
     values, nominal = numbers(found.twists), numbers({})
@@ -40,8 +48,9 @@ def to_mjcf(path, platform, found, folder):
     }
     _write_bodies(document, changed, nominal)
     lost = [*changes_of(structure, found, found.twists).lost, *write_stiffness(document, structure, found)]
-    axes = {key[1]: value for key, value in values.items() if key[0] == "axis"}
-    write_backlash(document, structure, found, {joint: (axis, values["pos", joint]) for joint, axis in axes.items()})
+    joints = [key[1] for key in values if key[0] == "axis" and isinstance(key[1], int)]
+    lines = {joint: (values["axis", joint], values["pos", joint]) for joint in joints}
+    write_backlash(document, structure, found, lines)
     _write_frames(document, structure.assembly.platform, changed)
     _write_anchors(document, model, values, errors)
     close_keys(document, model, [move.origin for move in structure.driven], document.compiled())
@@ -49,15 +58,16 @@ def to_mjcf(path, platform, found, folder):
     return document.text, tuple(lost)
 
 
-def measured_tool_mm(path):
+def measured_tool_mm(path: str | Path) -> np.ndarray | None:
     """Measured point (3,) on the platform of a file written by `to_mjcf`, None where it has none."""
     site = mujoco.MjSpec.from_file(str(path)).site(MEASURED_TOOL)
     return None if site is None else MM * np.array(site.pos)
 
 
-def _numbers(structure, found, twists):
+def _numbers(structure: Structure, found: Found, twists: TwistsBySite) -> dict[_Key, np.ndarray]:
     """Placements (4, 4) and vectors (3,) of the file under twists by site, by what they are of, lengths in mm."""
-    result, model = {}, structure.assembly.model
+    model = structure.assembly.model
+    result: dict[_Key, np.ndarray] = {}
     changes = changes_of(structure, found, twists)
     for body, placements in changes.bodies.items():
         behind = np.eye(4)
@@ -67,14 +77,21 @@ def _numbers(structure, found, twists):
             result["axis", joint] = turn @ model.jnt_axis[joint]
             result["pos", joint] = turn @ (MM * model.jnt_pos[joint] - behind[:3, 3])
         result["body", body] = structure.assembly.own(body) @ placements[0] @ behind
-    result |= {("anchor", k, end): at for k, both in changes.anchors.items() for end, at in enumerate(both)}
-    return result | {("frame", name): place for name, place in changes.frames.items()}
+    for k, both in changes.anchors.items():
+        result |= {("anchor", k, end): at for end, at in enumerate(both)}
+    result |= {("frame", name): place for name, place in changes.frames.items()}
+    return result
 
 
-def _write_bodies(document, changed, nominal):
+def _write_bodies(
+    document: MjcfDocument, changed: Mapping[_Key, tuple[np.ndarray, np.ndarray]], nominal: Mapping[_Key, np.ndarray]
+) -> None:
     """Write places of bodies, and axes and points of joints."""
     for key, (value, error) in changed.items():
         kind, number = key[:2]
+        if isinstance(number, str):
+            # a place on the platform, which `_write_frames` writes
+            continue
         if kind == "body":
             element = document.bodies[number]
             turned = np.abs(difference(nominal[key], value)[3:]).max() > SAME
@@ -93,22 +110,24 @@ def _write_bodies(document, changed, nominal):
             element.set(kind, words(value / scale))
 
 
-def _error_text(error):
+def _error_text(error: np.ndarray) -> str:
     """Standard errors (6,) of a placement in words."""
     if not error.any():
         return "with frame and tool, whose errors it has"
     return f"pos +- {sizes(error[:3] / MM)} m, turn about own axes +- {sizes(error[3:])} rad"
 
 
-def _write_frames(document, platform, changed):
+def _write_frames(document: MjcfDocument, platform: int, changed: Mapping[_Key, tuple[np.ndarray, np.ndarray]]) -> None:
     """Write places on the platform as sites."""
     for key, (value, error) in changed.items():
-        if key[0] == "frame":
+        if isinstance(key[1], str):
             place = {"pos": words(value[:3, 3] / MM), "quat": words(quaternion(value[:3, :3]))}
             document.note(document.site(platform, key[1], place), f"found: {_error_text(error)}")
 
 
-def _write_anchors(document, model, values, errors):
+def _write_anchors(
+    document: MjcfDocument, model: mujoco.MjModel, values: Mapping[_Key, np.ndarray], errors: Mapping[_Key, np.ndarray]
+) -> None:
     """Write the anchors of connects and welds where the changed places of the bodies would move them."""
     now = document.compiled()
     for k, element in enumerate(document.equalities):
@@ -127,7 +146,13 @@ def _write_anchors(document, model, values, errors):
             _hold(document, (k, element), (first, second), wanted, errors)
 
 
-def _hold(document, connect, bodies, points, errors):
+def _hold(
+    document: MjcfDocument,
+    connect: tuple[int, Element],
+    bodies: tuple[int, int],
+    points: list[np.ndarray],
+    errors: Mapping[_Key, np.ndarray],
+) -> None:
     """Write a connect (number, element) between sites at points of two bodies."""
     k, element = connect
     name = element.get("name") or f"connect{k + 1}"

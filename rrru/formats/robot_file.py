@@ -6,33 +6,53 @@ has no idle spin and is faster. Columns and sites have the joints' names. Files 
 in rad.
 """
 
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import fields, replace
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
 
 from rrru.errors import ConfigError, not_a_file, why_unreadable
 from rrru.formats import urdf_reader as urdf_files
-from rrru.formats.couplings import of_equalities, of_mimics
+from rrru.formats.couplings import Follows, of_equalities, of_mimics
 from rrru.formats.inertia import point_masses_of
+from rrru.formats.joint_graph import Move
 from rrru.formats.mjcf_reader import MM, Assembly
 from rrru.formats.structure import structure_of
 from rrru.kinematics.end_effectors import shared_joints, with_hands
 from rrru.kinematics.general_robot import GeneralRobot
-from rrru.kinematics.legs import Drive, Parts, unit_twist
+from rrru.kinematics.legs import Drive, Legs, Parts, unit_twist
 
 # a drive without limits works this far about its home value
 _RANGE = {"rad": 1.0, "mm": 100.0}
 _UNITS = {"R": "rad", "P": "mm"}
 _TRN = mujoco.mjtTrn
 # a model's numbers in m, kg and rad that define a robot, and their limit: larger ones are mistakes and would overflow
-_DEFINING = ("body_pos", "body_quat", "body_ipos", "body_mass", "jnt_pos", "jnt_axis", "jnt_range")
-_DEFINING += ("site_pos", "eq_data")
+_DEFINING = (
+    "body_pos",
+    "body_quat",
+    "body_ipos",
+    "body_mass",
+    "jnt_pos",
+    "jnt_axis",
+    "jnt_range",
+    "site_pos",
+    "eq_data",
+)
 _MOST = 1e9
 
 
-def from_urdf(path, base=None, tip=None, home=None, tips=None, carries=None, **options):
+def from_urdf(
+    path: str | Path,
+    base: str | None = None,
+    tip: str | None = None,
+    home: Mapping[str, float] | None = None,
+    tips: Mapping[str, str] | None = None,
+    carries: Mapping[str, Sequence[str]] | None = None,
+    **options: Any,
+) -> GeneralRobot:
     """The GeneralRobot of a URDF's chain from the link base, by default the root, to the link tip, the only last one.
 
     All joints between them are driven, except those that mimic others. home: values by driven joint of the home pose in
@@ -45,11 +65,12 @@ def from_urdf(path, base=None, tip=None, home=None, tips=None, carries=None, **o
         if not tips or len(tips) < 2 or tip:
             raise ConfigError(f"{file}: tips {', '.join(tips or ()) or 'none'}; allowed: two or more, and no tip")
         arms = {arm: from_urdf(path, base, link, home, **options) for arm, link in tips.items()}
-        return with_hands(arms, shared_joints(arms), carries)
+        robot: GeneralRobot = with_hands(arms, shared_joints(arms), carries)
+        return robot
     return _robot(*urdf_parts(file, base, tip, home), options)
 
 
-def with_tip(section):
+def with_tip(section: dict[str, Any]) -> dict[str, Any]:
     """A robot's entry in the configuration with the tip that its URDF has by default; other entries as they are.
 
     A corrected file may have further links at its tip.
@@ -60,7 +81,9 @@ def with_tip(section):
     return section | {"tip": urdf_files.ends(urdf_files.read(file), section.get("base"), None, file)[1]}
 
 
-def urdf_parts(path, base=None, tip=None, home=None):
+def urdf_parts(
+    path: str | Path, base: str | None = None, tip: str | None = None, home: Mapping[str, float] | None = None
+) -> tuple[Assembly, dict[int, list[np.ndarray]], dict[int, Follows]]:
     """The Assembly of a URDF's chain, its driven joints as `structure_of` wants them, and what follows them."""
     file = _existing(path)
     urdf = urdf_files.read(file)
@@ -84,12 +107,13 @@ def urdf_parts(path, base=None, tip=None, home=None):
         if link in urdf.odd:
             raise assembly.error(urdf.odd[link])
     follows = of_mimics(assembly, urdf.mimics)
-    servos = {move.joint: [] for move in assembly.moves.values() if move.joint not in follows}
+    driven = (move.joint for move in assembly.moves.values() if move.joint is not None)
+    servos: dict[int, list[np.ndarray]] = {joint: [] for joint in driven if joint not in follows}
     assembly.limits = {known[name]: limits for name, limits in urdf.limits.items() if name in known}
     return assembly, servos, follows
 
 
-def from_mjcf(path, platform, **options):
+def from_mjcf(path: str | Path, platform: str, **options: Any) -> GeneralRobot:
     """The GeneralRobot whose platform is a body of an MJCF, held by chains of bodies and by connects and welds.
 
     Joints with actuators are driven, and so are those that follow them by a joint equality. The home pose is that of
@@ -100,7 +124,7 @@ def from_mjcf(path, platform, **options):
     return _robot(*mjcf_parts(path, platform), options)
 
 
-def mjcf_parts(path, platform):
+def mjcf_parts(path: str | Path, platform: str) -> tuple[Assembly, dict[int, list[np.ndarray]], dict[int, Follows]]:
     """The Assembly of an MJCF, its driven joints as `structure_of` wants them, and what follows them."""
     file = _existing(path)
     try:
@@ -119,7 +143,7 @@ def mjcf_parts(path, platform):
     return assembly, servos, of_equalities(assembly, servos)
 
 
-def _existing(path):
+def _existing(path: str | Path) -> Path:
     """The Path of a file that exists and is text."""
     file = Path(path)
     if why := not_a_file(file):
@@ -131,7 +155,7 @@ def _existing(path):
     return file
 
 
-def _assembly(model, file, base, platform, home):
+def _assembly(model: mujoco.MjModel, file: Path, base: int, platform: int, home: np.ndarray) -> Assembly:
     """The Assembly of a model whose numbers are within limits; MuJoCo only warns of others."""
     for what, values in ({name: getattr(model, name) for name in _DEFINING} | {"the home pose": home}).items():
         if len(odd := values[~(np.abs(values) <= _MOST)]):
@@ -144,16 +168,17 @@ def _assembly(model, file, base, platform, home):
     return Assembly(model, file, base, platform, home)
 
 
-def _servos(assembly):
+def _servos(assembly: Assembly) -> dict[int, list[np.ndarray]]:
     """By driven joint of the legs, in the order of the actuators, ranges (low, high) of qpos that its servos allow."""
-    model, result = assembly.model, {}
+    model = assembly.model
+    result: dict[int, list[np.ndarray]] = {}
     of_legs = {move.joint for move in assembly.moves.values()} - {None}
     for k in range(len(model.actuator_trntype)):
         name, kind = model.actuator(k).name or f"actuator {k + 1}", int(model.actuator_trntype[k])
         moved = _moved_by(model, k)
         if moved is not None and not moved & of_legs:
             continue
-        if kind not in (_TRN.mjTRN_JOINT, _TRN.mjTRN_JOINTINPARENT):
+        if moved is None or kind not in (_TRN.mjTRN_JOINT, _TRN.mjTRN_JOINTINPARENT):
             raise assembly.error(f"{name} drives by {_TRN(kind).name[6:].lower()}; allowed: a joint")
         (joint,) = moved
         if model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_BALL:
@@ -167,7 +192,7 @@ def _servos(assembly):
     return result
 
 
-def _effort(model, joint):
+def _effort(model: mujoco.MjModel, joint: int) -> float:
     """Effort in N m or N that a model allows the actuators of a joint, NaN where it states none."""
     ranges = [model.jnt_actfrcrange[joint]] if model.jnt_actfrclimited[joint] else []
     of_joint = (model.actuator_trntype == _TRN.mjTRN_JOINT) & (model.actuator_trnid[:, 0] == joint)
@@ -176,7 +201,7 @@ def _effort(model, joint):
     return min(efforts, default=np.nan)
 
 
-def _moved_by(model, k):
+def _moved_by(model: mujoco.MjModel, k: int) -> set[int] | None:
     """Joints that an actuator moves, None where these are unknown."""
     kind, target = int(model.actuator_trntype[k]), int(model.actuator_trnid[k, 0])
     if kind in (_TRN.mjTRN_JOINT, _TRN.mjTRN_JOINTINPARENT):
@@ -188,7 +213,12 @@ def _moved_by(model, k):
     return None
 
 
-def _robot(assembly, servos, follows, options):
+def _robot(
+    assembly: Assembly,
+    servos: Mapping[int, Sequence[np.ndarray]],
+    follows: Mapping[int, Follows],
+    options: dict[str, Any],
+) -> GeneralRobot:
     """The GeneralRobot of an Assembly's legs, servos the driven joints as `_servos` gives them, follows by joint."""
     read = {"legs", "parts", "point_masses", "effort_limits", "velocity_limits"}
     known = {one.name for one in fields(GeneralRobot) if one.init} - read
@@ -196,38 +226,44 @@ def _robot(assembly, servos, follows, options):
         raise assembly.error(f"unknown key {unknown.pop()!r}; allowed: {', '.join(sorted(known))}")
     structure = structure_of(assembly, servos, follows, options.get("up"))
     chains, legs, moves = structure.chains, structure.legs, structure.driven
-    bars = [leg for leg in legs.legs if leg.bar]
-    arm = float(np.mean([np.linalg.norm(leg.bar.platform_mm) for leg in bars])) if bars else 0.0
-    defaults = {"name": assembly.file.stem, "up": structure.up} | ({"angle_arm_mm": arm} if arm else {})
+    ends = [np.linalg.norm(leg.bar.platform_mm) for leg in legs.legs if leg.bar]
+    arm = float(np.mean(ends)) if ends else 0.0
+    defaults: dict[str, Any] = {"name": assembly.file.stem, "up": structure.up} | ({"angle_arm_mm": arm} if arm else {})
     drives, followers = _drives(legs, [_drive(legs, k, move, chains.sites[move.name]) for k, move in enumerate(moves)])
-    parts = Parts(drives=drives, followers=followers, members=tuple((leg.bar_sites[0],) for leg in bars))
-    stated = [_stated(assembly, move, servos[move.joint]) for move in moves[: len(servos)]]
-    from_file = {"legs": legs, "parts": parts, "point_masses": point_masses_of(chains, structure.open_legs, legs)}
+    parts = Parts(
+        drives=drives, followers=followers, members=tuple((leg.bar_sites[0],) for leg in legs.legs if leg.bar)
+    )
+    stated = [_stated(assembly, joint, ranges) for joint, ranges in servos.items()]
+    from_file: dict[str, Any] = {
+        "legs": legs,
+        "parts": parts,
+        "point_masses": point_masses_of(chains, structure.open_legs, legs),
+    }
     ranges = [_range(assembly, move, given) for move, given in zip(moves, stated, strict=False)]
     from_file["drive_range"] = np.array(ranges)
     from_file["assumed"] = frozenset(drive.column for drive, given in zip(drives, stated, strict=True) if not given)
-    from_file |= _limits(assembly, moves[: len(servos)])
+    from_file |= _limits(assembly, servos)
     return GeneralRobot(**defaults | from_file | options)
 
 
-def _limits(assembly, moves):
-    """The `effort_limits` and `velocity_limits` of a GeneralRobot, of the driven joints of some Moves."""
+def _limits(assembly: Assembly, joints: Iterable[int]) -> dict[str, np.ndarray | None]:
+    """The `effort_limits` and `velocity_limits` of a GeneralRobot, of driven joints."""
     none = np.nan, np.nan
-    effort, velocity = np.array([assembly.limits.get(move.joint, none) for move in moves]).T
-    slides = np.array([move.kind == "P" for move in moves])
+    effort, velocity = np.array([assembly.limits.get(joint, none) for joint in joints]).T
+    slides = np.array([assembly.model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_SLIDE for joint in joints])
     return {
         "effort_limits": None if np.isnan(effort).all() else np.where(slides, effort, MM * effort),
         "velocity_limits": None if np.isnan(velocity).all() else np.where(slides, MM * velocity, velocity),
     }
 
 
-def _stated(assembly, move, servos):
+def _stated(assembly: Assembly, joint: int, servos: Sequence[np.ndarray]) -> list[np.ndarray]:
     """Ranges of a driven joint, its own and those of its servos, as far as they are stated."""
     model = assembly.model
-    return [*servos, *([model.jnt_range[move.joint]] if model.jnt_limited[move.joint] else [])]
+    return [*servos, *([model.jnt_range[joint]] if model.jnt_limited[joint] else [])]
 
 
-def _range(assembly, move, ranges):
+def _range(assembly: Assembly, move: Move, ranges: Sequence[np.ndarray]) -> tuple[float, float]:
     """Lowest and highest value of a driven joint within all of its ranges."""
     model, unit = assembly.model, MM if move.kind == "P" else 1.0
     if not ranges:
@@ -240,7 +276,7 @@ def _range(assembly, move, ranges):
     return unit * low, unit * high
 
 
-def _drives(legs, uncoupled):
+def _drives(legs: Legs, uncoupled: Sequence[Drive]) -> tuple[tuple[Drive, ...], tuple[Drive, ...]]:
     """The Drives, and those of the followers, from one uncoupled Drive for each driven value."""
     if legs.coupling is None:
         return tuple(uncoupled), ()
@@ -251,7 +287,7 @@ def _drives(legs, uncoupled):
     return tuple(drives), tuple(uncoupled[len(drives) :])
 
 
-def _drive(legs, number, move, site):
+def _drive(legs: Legs, number: int, move: Move, site: str) -> Drive:
     """The Drive of a driven value's Move, without its followers."""
     unit = _UNITS[move.kind]
     for leg in legs.legs:

@@ -3,14 +3,15 @@
 Lengths in mm, angles in rad.
 """
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from rrru.formats.chains import Chains, with_bars
-from rrru.formats.couplings import coupling
-from rrru.formats.joint_graph import undone
+from rrru.formats.chains import Chains, Cut, with_bars
+from rrru.formats.couplings import Follows, coupling
+from rrru.formats.joint_graph import Move, undone
 from rrru.formats.mjcf_reader import Assembly
 from rrru.kinematics.chain import Poses, Twists, bar_pose, walk
 from rrru.kinematics.closure import Closure
@@ -35,20 +36,30 @@ class Structure:
     assembly: Assembly
     chains: Chains
     open_legs: Legs
-    cuts: dict
+    cuts: dict[int, Cut]
     legs: Legs
-    servos: dict
-    follows: dict
-    up: tuple
+    servos: Mapping[int, Sequence[np.ndarray]]
+    follows: Mapping[int, Follows]
+    up: tuple[float, float, float]
 
     @property
-    def driven(self):
-        """Moves of the driven joints, in the order of the drives, and after them of their followers."""
+    def joints(self) -> tuple[int, ...]:
+        """MuJoCo's numbers of the driven joints, in the order of the drives, and after them of their followers."""
+        return (*self.servos, *self.follows)
+
+    @property
+    def driven(self) -> list[Move]:
+        """Moves of the `joints`."""
         moves = self.assembly.moves.values()
-        return [next(m for m in moves if m.joint == joint) for joint in (*self.servos, *self.follows)]
+        return [next(m for m in moves if m.joint == joint) for joint in self.joints]
 
 
-def structure_of(assembly, servos, follows, up=None):
+def structure_of(
+    assembly: Assembly,
+    servos: Mapping[int, Sequence[np.ndarray]],
+    follows: Mapping[int, Follows],
+    up: tuple[float, float, float] | None = None,
+) -> Structure:
     """The Structure of an Assembly.
 
     servos: by driven joint ranges (low, high) of qpos that its servos allow; follows: Follows by joint; up (3,): by
@@ -58,7 +69,7 @@ def structure_of(assembly, servos, follows, up=None):
         raise assembly.error(f"no joints lead from the base to {assembly.body_name(assembly.platform)}; allowed: a leg")
     if not servos:
         raise assembly.error("no actuator drives a joint of the legs; allowed: one or more")
-    offsets = {joint: one.offset for joint, one in follows.items()}
+    offsets: dict[int | None, float] = {joint: one.offset for joint, one in follows.items()}
     chains, home = Chains(assembly, [*servos, *follows], offsets), undone(assembly.home_of(assembly.base))
     pose = home @ assembly.home_of(assembly.platform)
     values = np.array([next(m.home for m in assembly.moves.values() if m.joint == joint) for joint in servos])
@@ -71,9 +82,10 @@ def structure_of(assembly, servos, follows, up=None):
     return Structure(assembly, chains, open_legs, cuts, legs, servos, follows, up)
 
 
-def _closed(assembly, legs, up):
+def _closed(assembly: Assembly, legs: Legs, up: tuple[float, float, float]) -> Legs:
     """Legs whose home pose closes all loops next to the file's; raises ConfigError where it cannot."""
-    start = Poses(legs.home_mm[None], legs.home_turn[None], legs.home_passive[None], None, None)
+    # a start has neither residual nor closed
+    start = Poses(legs.home_mm[None], legs.home_turn[None], legs.home_passive[None], None, None)  # type: ignore[arg-type]
     gaps = _gaps(legs, start)
     if gaps.max() > _OPEN_MM:
         joints = ", ".join(assembly.names_along(assembly.paths[gaps.argmax()]))
@@ -96,7 +108,7 @@ def _closed(assembly, legs, up):
     return replace(legs, legs=chains, home_mm=poses.position_mm[0], home_turn=poses.turn[0])
 
 
-def _gaps(legs, poses):
+def _gaps(legs: Legs, poses: Poses) -> np.ndarray:
     """Closure error (legs,) in mm of every leg at one pose with drives at home, angles counted in the arm."""
     result, actuators, twists = [], legs.home_drives[None], Twists(legs)
     for leg in legs.legs:

@@ -3,7 +3,10 @@
 Shapes are left out, which a robot's motion does not need. Fixed links stay, since base and tip are often fixed ones.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
+from typing import TypeAlias
 from xml.etree import ElementTree
 
 import mujoco
@@ -13,8 +16,10 @@ from rrru.errors import ConfigError
 
 # the least mass that MuJoCo asks of a body that moves; a link without one gets it, and counts as none
 NO_MASS_KG = 1e-12
-_ENDS = ("parent", "child")
 _ALLOWED = ("revolute", "continuous", "prismatic", "fixed")
+
+# name of the joint that one follows, None where the file has none, factor and offset
+Mimic: TypeAlias = tuple[str | None, float, float]
 
 
 @dataclass(frozen=True)
@@ -27,14 +32,14 @@ class Urdf:
     """
 
     model: mujoco.MjModel
-    children: dict
-    parents: dict
-    odd: dict
-    mimics: dict
-    limits: dict
+    children: dict[str, list[str]]
+    parents: dict[str, str]
+    odd: dict[str, str]
+    mimics: dict[str, Mimic]
+    limits: dict[str, tuple[float, float]]
 
 
-def read(file):
+def read(file: Path) -> Urdf:
     """The Urdf of a file; raises ConfigError with the parser's message."""
     try:
         robot = ElementTree.parse(file).getroot()
@@ -42,39 +47,56 @@ def read(file):
         raise ConfigError(f"{file}: {error}; allowed: a URDF") from None
     if robot.tag != "robot" or any("xacro" in element.tag for element in robot.iter()):
         raise ConfigError(f"{file}: its root is {robot.tag!r}; allowed: a URDF's robot, without xacro's macros")
-    children, parents, odd, mimics, limits = {}, {}, {}, {}, {}
+    children: dict[str, list[str]] = {}
+    parents: dict[str, str] = {}
+    odd: dict[str, str] = {}
+    mimics: dict[str, Mimic] = {}
+    limits: dict[str, tuple[float, float]] = {}
     for link in robot.iter("link"):
-        children.setdefault(link.get("name"), [])
+        children.setdefault(link.get("name", ""), [])
         for shape in (*link.findall("visual"), *link.findall("collision")):
             link.remove(shape)
     for joint in robot.findall("joint"):
-        parent, child = (joint.find(end).get("link") if joint.find(end) is not None else None for end in _ENDS)
+        # MuJoCo refuses what has no name, parent or child
+        name, parent, child = joint.get("name", ""), *(_link(joint, end) for end in ("parent", "child"))
         children.setdefault(parent, []).append(child)
         parents[child] = parent
         if joint.get("type") not in _ALLOWED:
-            odd[child] = f"joint {joint.get('name')} is of the type {joint.get('type')}; allowed: {', '.join(_ALLOWED)}"
-        limits[joint.get("name")] = _limits(joint)
+            odd[child] = f"joint {name} is of the type {joint.get('type')}; allowed: {', '.join(_ALLOWED)}"
+        limits[name] = _limits(joint)
         for mimic in joint.findall("mimic"):
-            mimics[joint.get("name")] = mimic.get("joint"), *_numbers(joint, mimic, file)
+            factor, offset = _numbers(joint, mimic, file)
+            mimics[name] = mimic.get("joint"), factor, offset
             joint.remove(mimic)
     return Urdf(
         _compiled(ElementTree.tostring(robot, encoding="unicode"), file), children, parents, odd, mimics, limits
     )
 
 
-def _limits(joint):
+def _link(joint: ElementTree.Element, end: str) -> str:
+    """Name of the link at an end of a joint, "" where there is none."""
+    found = joint.find(end)
+    return "" if found is None else found.get("link", "")
+
+
+def _limits(joint: ElementTree.Element) -> tuple[float, float]:
     """Effort and velocity of a joint's limit, NaN where none is stated; files write 0 for an unknown limit."""
-    limit, result = joint.find("limit"), []
-    for key in ("effort", "velocity"):
-        try:
-            value = float(limit.get(key)) if limit is not None and limit.get(key) else np.nan
-        except ValueError:
-            value = np.nan
-        result.append(value if 0.0 < value < np.inf else np.nan)
-    return tuple(result)
+    limit = joint.find("limit")
+    if limit is None:
+        return np.nan, np.nan
+    return _limit(limit.get("effort", "")), _limit(limit.get("velocity", ""))
 
 
-def _numbers(joint, mimic, file):
+def _limit(text: str) -> float:
+    """A limit above zero, NaN for any other text."""
+    try:
+        value = float(text)
+    except ValueError:
+        return np.nan
+    return value if 0.0 < value < np.inf else np.nan
+
+
+def _numbers(joint: ElementTree.Element, mimic: ElementTree.Element, file: Path) -> Iterator[float]:
     """Factor and offset of a mimic."""
     given = {key: mimic.get(key, default) for key, default in (("multiplier", "1"), ("offset", "0"))}
     for key, text in given.items():
@@ -85,7 +107,7 @@ def _numbers(joint, mimic, file):
             raise ConfigError(f"{file}: {text}; allowed: a number") from None
 
 
-def _compiled(text, file):
+def _compiled(text: str, file: Path) -> mujoco.MjModel:
     """The MjModel of a URDF's text."""
     try:
         spec = mujoco.MjSpec.from_string(text)
@@ -96,7 +118,7 @@ def _compiled(text, file):
         raise ConfigError(f"{file}: {' '.join(str(error).split())}; allowed: a URDF") from None
 
 
-def ends(urdf, base, tip, file):
+def ends(urdf: Urdf, base: str | None, tip: str | None, file: Path) -> tuple[str, str]:
     """Names of base and tip, by default the root link and the only link without children behind the base."""
     known = ", ".join(urdf.children)
     for what, name in (("base", base), ("tip", tip)):
@@ -111,6 +133,6 @@ def ends(urdf, base, tip, file):
     return base, leaves[0]
 
 
-def _behind(urdf, link):
+def _behind(urdf: Urdf, link: str) -> list[str]:
     """A link and all behind it."""
     return [link, *(other for child in urdf.children[link] for other in _behind(urdf, child))]

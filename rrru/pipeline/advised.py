@@ -1,12 +1,20 @@
 """The run that a diagnosis advises, as runs of a plan: a pass like the campaign's, or short passes of poses. mm, s."""
 
+from collections.abc import Mapping
+from typing import Any
+
+import pandas as pd
+
 from rrru.campaign import measurements as rows
-from rrru.campaign.plan import make_plan
+from rrru.campaign.plan import Run, make_plan
 from rrru.campaign.trajectories import Line, from_config
 from rrru.diagnosis.options import OPTIONS
+from rrru.pipeline.config import Motion
 
 
-def advised_runs(run, poses, trajectories, motion):
+def advised_runs(
+    run: Mapping[str, Any], poses: pd.DataFrame, trajectories: Mapping[str, Any], motion: Motion
+) -> tuple[Run, ...]:
     """Runs of a plan for a row of `gap_next_runs` as a mapping; poses: the diagnosis' `gap_next_poses`.
 
     trajectories: section of the campaign's own; motion: its speed, acceleration and dwell. A faster pass has the

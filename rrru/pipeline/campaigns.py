@@ -1,14 +1,20 @@
 """Tables of one campaign before any fit: state, singularities, workspace. Lengths in mm."""
 
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
 import numpy as np
 import pandas as pd
 
+from rrru.calibration.campaign_noise import Noise
 from rrru.campaign import measurements as rows
+from rrru.campaign.ingest.registration import Registration
 from rrru.estimation.intervals import QUANTILE_95
 from rrru.kinematics import workspace
+from rrru.kinematics.robot import Robot
 
 
-def with_singularities(robot, measurements, margin):
+def with_singularities(robot: Robot, measurements: pd.DataFrame, margin: float) -> tuple[pd.DataFrame, pd.DataFrame]:
     """The measurements with points near a constraint singularity marked, and the rows of `singularity`."""
     translational, constraint, determinant = robot.singularities(
         rows.command(measurements), rows.actuators(measurements, robot)
@@ -21,7 +27,7 @@ def with_singularities(robot, measurements, margin):
     )
 
 
-def workspace_table(robot, measurements):
+def workspace_table(robot: Robot, measurements: pd.DataFrame) -> pd.DataFrame:
     """Rows of `workspace`: a vertical slice and the horizontal one through the middle of the commands.
 
     The vertical one is y = 0, or through the same middle where the robot reaches no point there. No rows for robots
@@ -43,7 +49,15 @@ def workspace_table(robot, measurements):
     return pd.concat(frames, ignore_index=True)
 
 
-def campaign_row(robot, section, measurements, singular, noise, notes, registration=None):
+def campaign_row(
+    robot: Robot,
+    section: Mapping[str, Any],
+    measurements: pd.DataFrame,
+    singular: pd.DataFrame,
+    noise: Noise,
+    notes: Iterable[str],
+    registration: Registration | None = None,
+) -> dict[str, Any]:
     """The row of `campaigns`; noise: a `rrru.calibration.campaign_noise.Noise`."""
     counts = measurements["status"].value_counts()
     source = f"virtual robot {section['virtual']}" if "virtual" in section else f"file {section['ingest']}"
@@ -67,7 +81,7 @@ def campaign_row(robot, section, measurements, singular, noise, notes, registrat
     }
 
 
-def registration_table(registration):
+def registration_table(registration: Registration | None) -> pd.DataFrame:
     """Rows of `registration`; none without one."""
     columns = ["number", "unit", "value", "random_95", "points"]
     if registration is None:
@@ -84,7 +98,7 @@ def registration_table(registration):
     )
 
 
-def unmatched_sets(sets, measurements):
+def unmatched_sets(sets: Mapping[str, Iterable[str]], measurements: pd.DataFrame) -> tuple[str, ...]:
     """A note where calibration sets match none of the campaign's trajectories."""
     unmatched = [name for name, patterns in sets.items() if not rows.on_trajectories(measurements, patterns).any()]
     if not unmatched:
@@ -93,12 +107,12 @@ def unmatched_sets(sets, measurements):
     return (f"not calibrated on {', '.join(unmatched)}: these sets match none of the trajectories {present}",)
 
 
-def unadvised(advice):
+def unadvised(advice: Sequence[pd.DataFrame]) -> tuple[str, ...]:
     """A note where a campaign should follow advice (tables, the runs first) and no run was advised."""
     return ("no further run was advised, and none was added",) if advice and not len(advice[0]) else ()
 
 
-def _around_reachable(robot, grids, step_mm):
+def _around_reachable(robot: Robot, grids: Iterable[np.ndarray], step_mm: float) -> tuple[np.ndarray, np.ndarray]:
     """Points (n, 3) of the first grid of which the robot reaches some, and their actuator values (n, K).
 
     Those in the bounding box of its reachable points, widened by a tenth or step; all of the last grid where it reaches

@@ -3,13 +3,18 @@
 import hashlib
 import importlib
 import json
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from difflib import get_close_matches
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import yaml
 
 from rrru.errors import ConfigError
 from rrru.store.digest import code_digest
+
+if TYPE_CHECKING:
+    from jsonschema.exceptions import ValidationError
 
 # a larger number is a typing error, and results from it may overflow
 _MAX_NUMBER = 1e15
@@ -19,7 +24,7 @@ _COUNTED = ("required", "minProperties")
 _LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
 
-def check_schema(config, file, parts=False):
+def check_schema(config: Mapping[str, Any], file: str | Path, parts: bool = False) -> None:
     """Raise ConfigError with place and value where a configuration does not fit the JSON schema of a file.
 
     parts: sections and the keys of each may be missing, as in what the package's defaults hold. Types are stricter than
@@ -45,12 +50,12 @@ def check_schema(config, file, parts=False):
         raise ConfigError(f"{place}: {error.message}{allowed}{_as_number(error)}{_meant(error)}")
 
 
-def _without(rules, keys):
+def _without(rules: Mapping[str, Any], keys: Iterable[str]) -> dict[str, Any]:
     """A mapping without some keys."""
     return {key: value for key, value in rules.items() if key not in keys}
 
 
-def check_keys(files):
+def check_keys(files: Iterable[str | Path]) -> None:
     """Raise ConfigError with file and line where a YAML file has a key twice: YAML silently uses the last one."""
     for file in map(Path, files):
         try:
@@ -63,7 +68,7 @@ def check_keys(files):
             raise ConfigError(f"{file}, line {line}: {place}{key.value} occurs twice; allowed: each name once")
 
 
-def _repeated(node, place):
+def _repeated(node: yaml.Node | None, place: str) -> Iterator[tuple[str, yaml.ScalarNode]]:
     """Nodes of keys that occur twice in a mapping, below a YAML node, with the place of their mapping as text."""
     if isinstance(node, yaml.SequenceNode):
         for item in node.value:
@@ -79,7 +84,7 @@ def _repeated(node, place):
             yield from _repeated(value, f"{place}{key.value}.")
 
 
-def _as_number(error):
+def _as_number(error: "ValidationError") -> str:
     """The correct form of a number that YAML takes for text, such as 8.0e7; "" where the value is not a number."""
     if error.validator != "type" or not isinstance(error.instance, str):
         return ""
@@ -91,7 +96,7 @@ def _as_number(error):
     return f"; it is text to YAML: write {yaml.safe_dump(number).split()[0]}, without quotes"
 
 
-def _meant(error):
+def _meant(error: "ValidationError") -> str:
     """Known keys or words similar to the unknown ones, or all known keys where none is similar.
 
     For missing keys the description of the schema.
@@ -111,17 +116,17 @@ def _meant(error):
     return f"; allowed: {', '.join(known)}"
 
 
-def _is_number(value):
+def _is_number(value: Any) -> bool:
     """Whether a value is a finite number."""
     return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= _MAX_NUMBER
 
 
-def _is_whole(value):
+def _is_whole(value: Any) -> bool:
     """Whether a value is a whole number, written as one."""
     return _is_number(value) and isinstance(value, int)
 
 
-def _is_mapping(value):
+def _is_mapping(value: Any) -> bool:
     """Whether a value is a mapping whose keys are text."""
     return isinstance(value, dict) and all(isinstance(key, str) for key in value)
 
@@ -134,7 +139,9 @@ _STRICT = {
 }
 
 
-def check_once(config, checks, files, memory):
+def check_once(
+    config: Mapping[str, Any], checks: Sequence[str], files: Sequence[str | Path], memory: str | Path
+) -> None:
     """Call every check ("module:function") with the configuration, unless the same has passed them before.
 
     files: those that the checks read; memory: the file with the digest of the last passed configuration. A check raises

@@ -2,7 +2,9 @@
 
 import re
 import shlex
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import yaml
 
@@ -25,7 +27,7 @@ _KEYS = (
 _STATED = re.compile(rf"\b({'|'.join(_KEYS)}): (\{{[^{{}}]*\}}|\[[^\[\]]*\]|[\w.]+)")
 
 
-def as_option(key, value):
+def as_option(key: str, value: Any) -> str:
     """A key of a campaign's section with its value as an option.
 
     >>> as_option("frame", "register")
@@ -39,7 +41,7 @@ def as_option(key, value):
     return f"{_OPTIONS[key]} {text}" if key in _OPTIONS else f"--set {shlex.quote(f'{key}={text}')}"
 
 
-def options_in(message):
+def options_in(message: str) -> list[str]:
     """Options for the keys that a message says to write, in their order.
 
     >>> options_in("far off; allowed: frame: register turns another frame in")
@@ -50,7 +52,7 @@ def options_in(message):
     return [as_option(*one.split("=", 1)) for one in stated]
 
 
-def as_command(section, entry):
+def as_command(section: Mapping[str, Any], entry: Mapping[str, Any]) -> str:
     """The command that diagnoses a campaign's section, "" where it has no options for the robot's entry."""
     file = entry.get("urdf") or entry.get("mjcf")
     robot = [f"--robot {shlex.quote(str(file or section['robot']))}"]
@@ -63,7 +65,7 @@ def as_command(section, entry):
     return " ".join(["rrru diagnose", shlex.quote(str(section["ingest"])), *robot, *keys])
 
 
-def _in_a_line(value):
+def _in_a_line(value: Any) -> str:
     """A value as YAML in one line."""
     text = yaml.safe_dump(value, default_flow_style=True, sort_keys=False, allow_unicode=True, width=10**6)
-    return text.removesuffix("\n").removesuffix("\n...")
+    return str(text.removesuffix("\n").removesuffix("\n..."))

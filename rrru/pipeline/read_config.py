@@ -1,6 +1,8 @@
 """Configurations from YAML files: the package's defaults with overlays on top."""
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import yaml
 
@@ -11,12 +13,12 @@ DEFAULTS = Path(__file__).with_name("defaults.yaml")
 SCHEMA = Path(__file__).with_name("config.schema.yaml")
 
 
-def read_config(overlays=()):
+def read_config(overlays: Sequence[str | Path] = ()) -> dict[str, Any]:
     """The defaults of the package under overlays, paths of YAML files, and checked.
 
     Raises ConfigError for a file that is not a YAML mapping, a key that occurs twice, and an unknown or wrong value.
     """
-    config = {}
+    config: dict[str, Any] = {}
     check_keys(overlays)
     for file in (DEFAULTS, *overlays):
         try:
@@ -35,15 +37,15 @@ def read_config(overlays=()):
     return config
 
 
-def check_config(config):
+def check_config(config: Mapping[str, Any]) -> None:
     """Raise ConfigError with place and value where a configuration, or some sections of one, has a wrong value."""
     check_schema(config, SCHEMA, parts=True)
 
 
-def merged(below, above):
+def merged(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, Any]:
     """A mapping with the entries of another one on top."""
     both = {
         key: merged(below[key], value) if isinstance(value, dict) and isinstance(below.get(key), dict) else value
         for key, value in above.items()
     }
-    return below | both
+    return {**below, **both}

@@ -1,11 +1,18 @@
 """Construction of robots and campaigns from the parts of the configuration by `rrru.pipeline.config`."""
 
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any, TypeAlias
+
+import numpy as np
+import pandas as pd
 
 from rrru.campaign import measurements as rows
 from rrru.campaign import trajectories
-from rrru.campaign.plan import make_plan
+from rrru.campaign.plan import Plan, make_plan
 from rrru.estimation.starts import register_measurements
+from rrru.kinematics.robot import Robot
+from rrru.pipeline.config import RobotPart, VirtualPart
 from rrru.robots.catalogue import make_mechanism, tracked_set
 from rrru.seeds import stream
 from rrru.simulation import virtual_robot
@@ -13,7 +20,7 @@ from rrru.simulation.driven import DrivenRobot
 from rrru.simulation.tracker import Sees
 
 
-def mechanism(nominal, parameter_set=None):
+def mechanism(nominal: RobotPart, parameter_set: str | None = None) -> Robot:
     """The nominal robot with a set of parameters: by default the campaign's, or the one for tracked positions.
 
     Without bounds in the part, those of the robot are used.
@@ -27,7 +34,7 @@ def mechanism(nominal, parameter_set=None):
     return make_mechanism(name, nominal["dimensions"], parameter_set=parameter_set or default, **limits)
 
 
-def measured_robot(nominal, measurements, parameter_set=None):
+def measured_robot(nominal: RobotPart, measurements: pd.DataFrame, parameter_set: str | None = None) -> Robot:
     """The `mechanism` of a measured campaign, with the parameters that are identifiable from its poses.
 
     These include the open ones of its measurement configuration: frame, tool, places of reflectors.
@@ -36,7 +43,9 @@ def measured_robot(nominal, measurements, parameter_set=None):
     return as_measured(robot, measurements, nominal.get("targets", ()), nominal.get("registered", False))
 
 
-def as_measured(robot, measurements, targets=(), registered=False):
+def as_measured(
+    robot: Robot, measurements: pd.DataFrame, targets: Iterable[str] = (), registered: bool = False
+) -> Robot:
     """A nominal robot with the parameters identifiable from a measurement table; see `measured_robot`.
 
     targets: reflectors with stated places; registered: whether the frame was registered.
@@ -45,7 +54,12 @@ def as_measured(robot, measurements, targets=(), registered=False):
     measurements = register_measurements(measurements, robot)
     known = measurements[rows.usable(measurements)]
     actuators = rows.actuators(known, robot)
-    return robot.seen_at(actuators, rows.command(known), rows.readings(known, robot.angle_arm_mm))
+    result: Robot = robot.seen_at(actuators, rows.command(known), rows.readings(known, robot.angle_arm_mm))
+    return result
+
+
+# positions (N, 3) in the order driven to actuator values (N, K), or these to others
+Controller: TypeAlias = Callable[[np.ndarray], np.ndarray]
 
 
 @dataclass(frozen=True)
@@ -58,24 +72,24 @@ class VirtualCampaign:
     """
 
     robot: DrivenRobot
-    plan: object
+    plan: Plan
     noise_mm: float
     seed: int
     name: str
     origin: str = "campaign"
-    drive: object = None
+    drive: Controller | None = None
     sees: Sees = field(default_factory=Sees)
     draw: int | None = None
 
-    def generator(self, *labels):
+    def generator(self, *labels: str | int) -> np.random.Generator:
         """Random stream of this campaign for a purpose."""
         return stream(self.seed, self.origin, self.name, *labels)
 
-    def drawn(self, label, draw=None):
+    def drawn(self, label: str, draw: int | None = None) -> np.random.Generator:
         """Random stream of the measurements of a label, in a numbered draw or in that without a number."""
         return self.generator(*(() if draw is None else ("redraw", draw)), label)
 
-    def run(self, controller=None, label="measure"):
+    def run(self, controller: Controller | None = None, label: str = "measure") -> tuple[pd.DataFrame, pd.DataFrame]:
         """Measurements, with the actuator values that the controller wants, and truth.
 
         controller: positions (N, 3) in the order driven to actuator values, by default the nominal inverse kinematics;
@@ -83,7 +97,10 @@ class VirtualCampaign:
         """
         mechanism, generator = self.robot.mechanism, self.drawn(label, self.draw)
         if self.drive is None:
-            return self.robot.run(self.plan, self.noise_mm, generator, controller, self.sees)
+            tables: tuple[pd.DataFrame, pd.DataFrame] = self.robot.run(
+                self.plan, self.noise_mm, generator, controller, self.sees
+            )
+            return tables
         path, index = self.plan.path()
         wanted = (controller or mechanism.inverse)(path)
         sent = self.drive(wanted)
@@ -92,17 +109,21 @@ class VirtualCampaign:
         return measurements.assign(**dict(zip(mechanism.parts.columns, read.T, strict=True))), truth
 
 
-def real_robot(nominal, section):
+def real_robot(nominal: RobotPart, section: Mapping[str, Any]) -> DrivenRobot:
     """The virtual robot of a nominal one and an entry of `virtual_robots:`; see `virtual_campaign`."""
     if "mujoco" not in section:
-        return virtual_robot.from_config(mechanism(nominal), section)
+        real: DrivenRobot = virtual_robot.from_config(mechanism(nominal), section)
+        return real
     # a large import that other robots do not need
     from rrru.simulation import mujoco_robot
 
-    return mujoco_robot.from_config(mechanism(nominal), nominal["dimensions"], section)
+    simulated: DrivenRobot = mujoco_robot.from_config(mechanism(nominal), nominal["dimensions"], section)
+    return simulated
 
 
-def virtual_campaign(nominal, virtual, advice=None):
+def virtual_campaign(
+    nominal: RobotPart, virtual: VirtualPart, advice: Sequence[pd.DataFrame] | None = None
+) -> VirtualCampaign:
     """The virtual campaign of its parts; raises ConfigError where a number or a name of the robot is not allowed.
 
     advice: tables `gap_next_runs` and `gap_next_poses`, whose first run is driven after the passes, if there is any.
@@ -129,6 +150,6 @@ def virtual_campaign(nominal, virtual, advice=None):
     )
 
 
-def true_deviations(robot, truth):
+def true_deviations(robot: Robot, truth: dict[str, float] | None) -> dict[str, float] | None:
     """True deviations by the names of the mechanism's parameters from those of the real robot, None where unknown."""
     return None if truth is None else robot.identifiable(truth)

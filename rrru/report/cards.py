@@ -1,6 +1,8 @@
 """The answers on the first screen: one card per campaign, from its `verdict.json` and the facts of the campaign."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any, TypeAlias
 
 from rrru.diagnosis.verdict_text import (
     NOT_CORRECTED,
@@ -12,6 +14,7 @@ from rrru.diagnosis.verdict_text import (
     share_with_interval,
 )
 from rrru.report import worth
+from rrru.report.worth import Worth
 
 # colours of the budget's parts: effects in the order of their share, then what is no effect
 _EFFECTS = ("blue", "sky", "green", "pink", "yellow")
@@ -22,6 +25,8 @@ _WORDS = {
     "unexplained": "nothing in the library explains it",
 }
 _LEAST_SHARE = 0.005
+# the content of a `verdict.json`, or a part of it; `rrru/pipeline/verdict.schema.yaml` has the keys
+Facts: TypeAlias = Mapping[str, Any]
 # no instrument resolves less
 _LEAST_MM = 0.001
 
@@ -70,18 +75,20 @@ class Card:
     left: str
     noise: str
     lead: str
-    sentences: list
-    advice: list
+    sentences: list[str]
+    advice: list[Advice]
     next: str
-    notes: list
-    models: list
+    notes: list[str]
+    models: list[str]
     drives: str
-    worth: list
-    parts: list
-    steps: list
+    worth: list[str]
+    parts: list[Part]
+    steps: list[Step]
 
 
-def card(facts, source="", found=None, models=(), drives=""):
+def card(
+    facts: Facts, source: str = "", found: Worth | None = None, models: Sequence[str] = (), drives: str = ""
+) -> Card:
     """The Card of facts; source: where the campaign came from; found: the Worth of its calibration, or None; models:
     links to corrected files of the robot; drives: the one to `corrected_drives`, empty without these.
     """
@@ -108,7 +115,7 @@ def card(facts, source="", found=None, models=(), drives=""):
     )
 
 
-def _short(facts):
+def _short(facts: Facts) -> str:
     """The answer in a line: causes with their shares, the probability, and the next run."""
     named = [(readable(effect["name"]), _known_share(effect)) for effect in facts["effects"]]
     if facts["no_answer"]:
@@ -121,12 +128,12 @@ def _short(facts):
     return f"{causes.capitalize() or 'Nothing to add'} (probability {probability(facts['probability'])}).{following}"
 
 
-def _known_share(part):
+def _known_share(part: Facts) -> float | None:
     """The share of an effect or of a part of the budget, None where there is none or its interval says nothing."""
     return part["share"] if part["share"] is not None and is_determined(part) else None
 
 
-def _advice(effects):
+def _advice(effects: Sequence[Facts]) -> list[Advice]:
     """Advice on the named causes that are the library's."""
     return [
         Advice(
@@ -137,14 +144,14 @@ def _advice(effects):
     ]
 
 
-def _not_corrected(facts):
+def _not_corrected(facts: Facts) -> str:
     """Why there is no corrected file where there could be one, empty where there is."""
     file = facts.get("corrected_file")
     lacking = "; ".join(file["not_in_model"]) if file else ""
     return lacking if lacking.startswith(NOT_CORRECTED) else ""
 
 
-def _file_worth(facts):
+def _file_worth(facts: Facts) -> list[str]:
     """Sentences on the errors of the corrected file, which are next to its link."""
     if why := _not_corrected(facts):
         return [f"Your robot's file was {why}."]
@@ -163,14 +170,14 @@ def _file_worth(facts):
     return [said, left_out, *([f"{file['remainder'][0].upper()}{file['remainder'][1:]}."] if file["remainder"] else [])]
 
 
-def _file_error(size_mm):
+def _file_error(size_mm: float | None) -> str:
     """A size in mm as text, empty where it is not known."""
     if size_mm is None:
         return ""
     return f"{rounded(size_mm) if size_mm >= _LEAST_MM else f'less than {_LEAST_MM}'} mm"
 
 
-def _parts(budget):
+def _parts(budget: Sequence[Facts]) -> list[Part]:
     """Parts of the budget that add up, effects by share first."""
     shown = [part for part in budget if part["kind"] in ("effect", *_OTHERS) and part["share"] > _LEAST_SHARE]
     effects = sorted((p for p in shown if p["kind"] == "effect"), key=lambda part: -part["share"])
@@ -187,7 +194,7 @@ def _parts(budget):
     ]
 
 
-def _steps(facts):
+def _steps(facts: Facts) -> list[Step]:
     """The gap at left-out points before and after the effects are added, and the noise."""
     rows = [("calibrated", facts["gap_rms_mm"], "before")]
     if facts["effects"]:

@@ -1,10 +1,14 @@
 """Frames as tables of a page: words in the head, numbers short, what each column means as a hint."""
 
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pandas as pd
+
+from rrru.store.schema import Table
 
 # units that the names of columns end in, as they are read
 _UNITS = {unit: unit for unit in ("mm", "rad", "deg", "s", "kg", "nats")}
@@ -36,18 +40,18 @@ class Grid:
     title: str
     about: str
     path: str
-    columns: list
-    rows: list
+    columns: list[Column]
+    rows: list[list[str]]
 
 
-def words(name):
+def words(name: str) -> str:
     """A column's or an effect's name as words, its unit in parentheses."""
     found = _UNIT.search(name)
     stem = name[: found.start()] if found else name
     return stem.replace("_", " ") + (f" ({_UNITS[found[1]]})" if found else "")
 
 
-def head(name, meaning=""):
+def head(name: str, meaning: str = "") -> str:
     """A column's name as words; of an end of a 95 % interval, as its meaning says, with the interval."""
     if name == "random_95":
         return "random part, 95 %: ±"
@@ -58,7 +62,7 @@ def head(name, meaning=""):
     return ", ".join(part for part in (words(name[: found.start()]), f"95 % {end}") if part)
 
 
-def text(value):
+def text(value: Any) -> str:
     """A cell's text: numbers to four digits, yes and no, a dash for nothing."""
     if isinstance(value, bool | np.bool_):
         return "yes" if value else "no"
@@ -69,7 +73,7 @@ def text(value):
     return str(value).replace("-", MINUS) if isinstance(value, int | np.integer) else str(value)
 
 
-def short(value):
+def short(value: float) -> str:
     """A number to four digits; an exponent only where there are many zeros."""
     if not np.isfinite(value):
         return "∞" if value > 0.0 else f"{MINUS}∞"
@@ -82,13 +86,20 @@ def short(value):
     return shown.replace("-", MINUS)
 
 
-def grid(frame, key, title, table=None, path="", heads=None):
+def grid(
+    frame: pd.DataFrame,
+    key: str,
+    title: str,
+    table: Table | None = None,
+    path: str = "",
+    heads: Mapping[str, str] | None = None,
+) -> Grid:
     """A Grid of a frame.
 
     table: the Table whose columns it has, for what they mean, None where there is none; heads: words of single columns.
     """
     meaning = {column.name: column.description for column in table.columns} if table else {}
-    heads = {name: head(name, meaning.get(name, "")) for name in frame} | (heads or {})
+    heads = {name: head(name, meaning.get(name, "")) for name in frame} | dict(heads or {})
     rows = [[text(value) for value in row] for row in frame.itertuples(index=False)]
     longest = [max(map(len, cells), default=0) for cells in zip(*rows, strict=True)] or [0] * len(frame.columns)
     looks = [

@@ -3,8 +3,10 @@
 Lengths in mm, angles in rad; sizes of gaps are 3-D root mean squares.
 """
 
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -30,12 +32,12 @@ class Side:
 
     name: str
     campaign: str
-    saved: dict
-    frames: dict
-    verdict: dict
+    saved: dict[str, Any]
+    frames: dict[str, pd.DataFrame]
+    verdict: dict[str, Any]
 
     @property
-    def settings(self):
+    def settings(self) -> CalibrationSettings:
         """How it was calibrated."""
         return CalibrationSettings.from_config(self.saved["calibration"])
 
@@ -50,7 +52,7 @@ class Difference:
     chance: float
 
 
-def read(folder, campaign, name):
+def read(folder: str | Path, campaign: str, name: str) -> Side:
     """The Side of a campaign in a folder of results; raises ConfigError where it is not there or is not calibrated."""
     folder = Path(folder)
     if not folder.is_dir():
@@ -69,12 +71,12 @@ def read(folder, campaign, name):
     return Side(name, campaign, json_files.read(place / "robot.json"), frames, json_files.read(place / "verdict.json"))
 
 
-def calibrated(folder):
+def calibrated(folder: str | Path) -> list[str]:
     """Names of the campaigns of a folder of results that can be compared."""
     return [place.parent.name for place in sorted(Path(folder).glob("campaigns/*/robot.json"))]
 
 
-def widest(first, second):
+def widest(first: Side, second: Side) -> str:
     """The set of trajectories that both are calibrated on, with most points; raises ConfigError where there is none."""
     counts = [
         side.frames["calibrations"].query("method == @METHOD").set_index("calibration")["points"]
@@ -85,15 +87,15 @@ def widest(first, second):
         lists = _listed((first, second), (count.index for count in counts))
         raise ConfigError(f"compare: no set of trajectories that both are calibrated on; {lists}")
     total = counts[0][common] + counts[1][common]
-    return total.sort_index().idxmax()
+    return str(total.sort_index().idxmax())
 
 
-def _listed(sides, names):
+def _listed(sides: tuple[Side, Side], names: Iterable[Iterable[str]]) -> str:
     """Names of both sides for a message."""
     return " and ".join(f"{side.name}: {', '.join(listed)}" for side, listed in zip(sides, names, strict=True))
 
 
-def check(first, second):
+def check(first: Side, second: Side) -> None:
     """Raise ConfigError where the parameters of two sides are not comparable."""
     one, other = first.saved["nominal"], second.saved["nominal"]
     if one["name"] != other["name"]:
@@ -111,14 +113,14 @@ def check(first, second):
         raise ConfigError(f"compare: the readings differ: {what}; allowed: campaigns with the same readings")
 
 
-def _read_in(side):
+def _read_in(side: Side) -> str:
     """What was read in a campaign, in words."""
     measurements = side.frames["measurements"]
     named = sorted(measurements["target"].dropna().unique()) if "target" in measurements else ["the tool"]
     return ", ".join(named) + (", with orientations" if rows.has_turns(measurements) else "")
 
 
-def difference(first, second, calibration):
+def difference(first: Side, second: Side, calibration: str) -> Difference:
     """The Difference of two calibrations on a set; raises ConfigError where they have other parameters."""
     values, covariances = zip(*(_estimate(side, calibration) for side in (first, second)), strict=True)
     if list(values[0].index) != list(values[1].index):
@@ -138,7 +140,7 @@ def difference(first, second, calibration):
     return Difference(frame, square, freedom, float(chi2.sf(square, freedom)) if freedom else 1.0)
 
 
-def _other_numbers(sides, names):
+def _other_numbers(sides: tuple[Side, Side], names: Sequence[set[str]]) -> str:
     """Why two sides with different parameters cannot be compared."""
     only = [sorted(names[k] - names[1 - k]) for k in range(2)]
     if all(name.startswith(_FRAME) for name in only[0] + only[1]):
@@ -152,7 +154,7 @@ def _other_numbers(sides, names):
     return f"calibrated with different parameters; {lists}"
 
 
-def _estimate(side, calibration):
+def _estimate(side: Side, calibration: str) -> tuple[pd.DataFrame, np.ndarray]:
     """Values of a calibration by parameter, and their covariance, NaN for what has no standard error."""
     values = side.frames["parameters"].query("calibration == @calibration and method == @METHOD").set_index("parameter")
     pairs = side.frames["correlations"].query("calibration == @calibration")
@@ -163,7 +165,7 @@ def _estimate(side, calibration):
     return values, matrix.to_numpy() * np.outer(error, error)
 
 
-def over_runs(values, runs):
+def over_runs(values: pd.Series, runs: pd.Series) -> tuple[float, float]:
     """Mean of values (n,) and its standard error, with runs as independent units; 0 where there is one run."""
     by_run = values.groupby(runs).agg(["mean", "size"])
     mean, weight, count = values.mean(), by_run["size"] / len(values), len(by_run)
@@ -181,7 +183,7 @@ class GapDifference:
     chance: float
 
 
-def gap_difference(first, second):
+def gap_difference(first: Side, second: Side) -> GapDifference:
     """The GapDifference of two Sides."""
     squares = [_square(side) for side in (first, second)]
     apart = squares[1][0] - squares[0][0]
@@ -196,12 +198,12 @@ def gap_difference(first, second):
     return GapDifference(pd.DataFrame(rows), float(2.0 * norm.sf(abs(apart) / error)) if error > 0.0 else 1.0)
 
 
-def _sized_parts(side):
+def _sized_parts(side: Side) -> list[dict[str, Any]]:
     """Parts of the budget that are sizes."""
     return [part for part in side.verdict["budget"] if part["kind"] in _PARTS]
 
 
-def _square(side):
+def _square(side: Side) -> tuple[float, float]:
     """Mean square of the gap, noise subtracted, and its standard error over the runs."""
     points = side.frames["gap_points"].query("used")
     size = (points[[f"before_{axis}_mm" for axis in "xyz"]] ** 2).sum(axis=1)
@@ -209,7 +211,7 @@ def _square(side):
     return mean - side.verdict["noise_rms_mm"] ** 2, error
 
 
-def _interval(side, part):
+def _interval(side: Side, part: Mapping[str, Any] | None) -> tuple[float, float, float]:
     """Size of a part with its 95 % interval, zeros where the side does not have it."""
     if part is None:
         return 0.0, 0.0, 0.0
@@ -218,9 +220,9 @@ def _interval(side, part):
     return part["rms_mm"], *(float(np.sqrt(max(part[end], 0.0) * whole)) for end in ("share_low", "share_high"))
 
 
-def _part_row(name, first, second):
+def _part_row(name: str, first: tuple[float, float, float], second: tuple[float, float, float]) -> dict[str, Any]:
     """A row of both sides' sizes and intervals."""
-    row = {"part": name}
+    row: dict[str, Any] = {"part": name}
     for side, (size, low, high) in zip("ab", (first, second), strict=True):
         row |= {f"{side}_rms_mm": size, f"{side}_low_mm": low, f"{side}_high_mm": high}
     return row | {"differs": first[2] < second[1] or second[2] < first[1]}

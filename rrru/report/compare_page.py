@@ -3,18 +3,22 @@
 A and B are folders of results, campaigns of `results`, or `folder:campaign`.
 """
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeAlias
 
 import pandas as pd
 
 from rrru.diagnosis.verdict_text import probability, readable, rounded
 from rrru.errors import ConfigError
 from rrru.report import cells, compare, page
-from rrru.report.compare import gap_difference
-from rrru.report.compare_unseen import same_points, unseen
+from rrru.report.compare import Difference, GapDifference, Side, gap_difference
+from rrru.report.compare_unseen import Unseen, same_points, unseen
 
 _RESULTS = "results"
+# folder and campaign
+_Place: TypeAlias = tuple[str, str]
 # less likely by chance than this counts as a difference
 _LEVEL = 0.01
 
@@ -25,19 +29,19 @@ class Chapter:
 
     key: str
     title: str
-    sentences: list
+    sentences: list[str]
     points: str
-    grids: list
+    grids: list[cells.Grid]
 
 
-def pairs(first, second):
+def pairs(first: str, second: str) -> list[tuple[_Place, _Place]]:
     """Pairs ((folder, campaign), (folder, campaign)) of two arguments; raises ConfigError where they give none."""
     places = [_place(text) for text in (first, second)]
     if places[0] == places[1]:
         raise ConfigError(f"compare: A and B are both {first}; give two folders, or two campaigns of {_RESULTS}")
     (one, campaign), (other, other_campaign) = places
-    if campaign or other_campaign:
-        return [((one, campaign or other_campaign), (other, other_campaign or campaign))]
+    if chosen := campaign or other_campaign:
+        return [((one, campaign or chosen), (other, other_campaign or chosen))]
     common = [name for name in compare.calibrated(one) if name in compare.calibrated(other)]
     if not common:
         lists = " and ".join(
@@ -47,13 +51,13 @@ def pairs(first, second):
     return [((one, name), (other, name)) for name in common]
 
 
-def write(first, second, path):
+def write(first: str, second: str, path: str | Path) -> None:
     """Write the page of two arguments as a whole or not at all."""
     chapters = [_chapter(*pair) for pair in pairs(first, second)]
     page.save(page.render("compare.html", chapters=chapters, first=first, second=second), path)
 
 
-def _place(text):
+def _place(text: str) -> tuple[str, str | None]:
     """Folder and campaign of an argument, None for all campaigns of a folder."""
     folder, colon, campaign = text.rpartition(":")
     if colon:
@@ -67,7 +71,7 @@ def _place(text):
     return _RESULTS, text
 
 
-def _chapter(first, second):
+def _chapter(first: _Place, second: _Place) -> Chapter:
     """The Chapter on two campaigns."""
     names = [campaign for _, campaign in (first, second)]
     if names[0] == names[1]:
@@ -90,7 +94,7 @@ def _chapter(first, second):
     return Chapter(key, f"{names[0]} compared with {names[1]}", sentences, _points(judged, calibration, shared), grids)
 
 
-def _numbers(found, shared):
+def _numbers(found: Difference, shared: int) -> str:
     """Whether the fitted parameters differ."""
     known = found.rows.dropna()
     if known.empty:
@@ -107,7 +111,7 @@ def _numbers(found, shared):
     return f"The fitted parameters {said} ({measure}; {most}).{common}"
 
 
-def _gap(one, other, gap):
+def _gap(one: Side, other: Side, gap: GapDifference) -> Iterator[str]:
     """Residual error of each side, and whether it differs."""
     for side in (one, other):
         facts = side.verdict
@@ -125,20 +129,21 @@ def _gap(one, other, gap):
     yield f"As a whole the two {said} (by chance with probability {_chance(gap.chance)}).{parts}"
 
 
-def _better(sides, judged):
+def _better(sides: tuple[Side, Side], judged: Sequence[Unseen]) -> Iterator[str]:
     """Which side predicts better, campaign by campaign, and which one to trust."""
-    winners = []
+    winners: list[Side | None] = []
     for place in judged:
         sizes = f"{rounded(place.rms_mm[0])} mm against {rounded(place.rms_mm[1])} mm"
         where = f"On {place.points} points of {place.campaign} that neither has seen"
+        better = sides[0] if place.gain_mm2 > 0.0 else sides[1]
         clear = place.chance < _LEVEL
-        winners.append((sides[0] if place.gain_mm2 > 0.0 else sides[1]) if clear else None)
-        said = f"{winners[-1].name} is better" if clear else "they do not differ beyond chance"
+        winners.append(better if clear else None)
+        said = f"{better.name} is better" if clear else "they do not differ beyond chance"
         yield f"{where} {said}: {sizes} (by chance with probability {_chance(place.chance)})."
     yield f"Which to trust: {_trusted(sides, winners)}"
 
 
-def _trusted(sides, winners):
+def _trusted(sides: tuple[Side, Side], winners: Sequence[Side | None]) -> str:
     """The advice that follows from who is better on whose points."""
     distinct = {side.name for side in winners if side}
     if not winners:
@@ -152,7 +157,7 @@ def _trusted(sides, winners):
     return "neither: each is worse on its own measurements than the other."
 
 
-def _points(judged, calibration, shared):
+def _points(judged: Sequence[Unseen], calibration: str, shared: int) -> str:
     """Which points the comparison was made on."""
     listed = " and ".join(f"{place.points} of {place.campaign}" for place in judged) or "none"
     same = " Points that both have measured are left out of both fits." if shared else ""
@@ -164,13 +169,13 @@ def _points(judged, calibration, shared):
     )
 
 
-def _heads(frame, names):
+def _heads(frame: pd.DataFrame, names: Sequence[str]) -> dict[str, str]:
     """Words of the columns of both sides: their names for a and b."""
     name_of = {"a": names[0], "b": names[1]}
     sides = [name for name in frame if name.partition("_")[0] in name_of]
     return {name: f"{name_of[name[0]]} {cells.words(name[2:])}".strip() for name in sides}
 
 
-def _chance(value):
+def _chance(value: float) -> str:
     """A probability by chance."""
     return "less than 0.001" if value < 0.001 else f"{value:.3f}" if value < 0.1 else f"{value:.2f}"

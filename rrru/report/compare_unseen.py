@@ -11,8 +11,9 @@ from rrru.calibration.campaign_fit import deviation_vector, select
 from rrru.campaign import measurements as rows
 from rrru.compensation.evaluate import model_residual
 from rrru.errors import FitError
+from rrru.kinematics.robot import Robot
 from rrru.pipeline import setup
-from rrru.report.compare import METHOD, over_runs
+from rrru.report.compare import METHOD, Side, over_runs
 
 # with fewer trajectories or runs than this a campaign is cut into as many stretches
 _FOLDS = 4
@@ -32,17 +33,17 @@ class Unseen:
     campaign: str
     rows: pd.DataFrame
     points: int
-    rms_mm: tuple
+    rms_mm: tuple[float, float]
     gain_mm2: float
     chance: float
 
 
-def same_points(first, second):
+def same_points(first: Side, second: Side) -> int:
     """Points that both were measured at and read the same there: the same measurement."""
     return int(_rows_of(first.frames["measurements"], second.frames["measurements"]).sum())
 
 
-def unseen(first, second, calibration):
+def unseen(first: Side, second: Side, calibration: str) -> list[Unseen]:
     """The Unseen of each campaign that has points which neither side has used.
 
     A point is predicted by the other campaign's calibration, which has not used it. It is also predicted by its own,
@@ -53,7 +54,7 @@ def unseen(first, second, calibration):
     return [_compared(place.campaign, frame) for place, frame in found if len(frame)]
 
 
-def _compared(campaign, frame):
+def _compared(campaign: str, frame: pd.DataFrame) -> Unseen:
     """The Unseen of errors (mm) a and b with their trajectory and run."""
     frame = frame.assign(gain=frame["b"] ** 2 - frame["a"] ** 2)
     drawn = _drawn(frame["run"])
@@ -68,7 +69,7 @@ def _compared(campaign, frame):
     return Unseen(campaign, table, len(frame), (_rms(frame["a"]), _rms(frame["b"])), gain, chance)
 
 
-def _drawn(run):
+def _drawn(run: pd.Series) -> pd.Series:
     """Units of resampling of points in runs (n,): the runs, or stretches of points where there are few of them."""
     if run.nunique() >= _FOLDS:
         return run
@@ -76,13 +77,13 @@ def _drawn(run):
     return pd.Series(np.arange(len(run)) * max(count, 1) // max(len(run), 1), index=run.index)
 
 
-def _places(first, second):
+def _places(first: Side, second: Side) -> tuple[Side, ...]:
     """Sides whose points are predicted: one where both were measured together."""
     together = same_points(first, second) == len(first.frames["measurements"]) == len(second.frames["measurements"])
     return (first,) if together else (first, second)
 
 
-def _prediction_errors(place, sides, calibration):
+def _prediction_errors(place: Side, sides: tuple[Side, Side], calibration: str) -> pd.DataFrame:
     """Errors (mm) of both sides, a and b, at the points of one of them, with their trajectory and run."""
     measurements = place.frames["measurements"].reset_index(drop=True)
     usable = rows.usable(measurements, place.settings.use_near_singularity)
@@ -99,7 +100,7 @@ def _prediction_errors(place, sides, calibration):
     return errors[chosen].dropna()
 
 
-def _without(side, fold, calibration):
+def _without(side: Side, fold: pd.DataFrame, calibration: str) -> tuple[Robot, np.ndarray]:
     """A side's robot and its deviations from all of its points except those of a fold."""
     measurements = side.frames["measurements"]
     robot = setup.measured_robot(side.saved["nominal"], measurements)
@@ -115,20 +116,20 @@ def _without(side, fold, calibration):
     return robot, fit.deviations
 
 
-def _rows_of(measurements, others):
+def _rows_of(measurements: pd.DataFrame, others: pd.DataFrame) -> np.ndarray:
     """Rows (n,) of measurements that are among others: commanded and measured at the same place."""
     known = pd.MultiIndex.from_frame(others[_SAME].round(9))
-    return pd.MultiIndex.from_frame(measurements[_SAME].round(9)).isin(known)
+    return np.asarray(pd.MultiIndex.from_frame(measurements[_SAME].round(9)).isin(known))
 
 
-def _folds(measurements):
+def _folds(measurements: pd.DataFrame) -> np.ndarray:
     """Groups of points that are left out together: their trajectory, their run, or a stretch."""
     for name in ("trajectory", "run"):
         if measurements[name].nunique() >= _FOLDS:
-            return measurements[name].to_numpy()
+            return np.asarray(measurements[name].to_numpy())
     return np.arange(len(measurements)) * _FOLDS // max(len(measurements), 1)
 
 
-def _rms(values):
+def _rms(values: pd.Series) -> float:
     """Root mean square."""
     return float(np.sqrt((values**2).mean()))

@@ -26,9 +26,9 @@ class Section:
     key: str
     title: str
     about: str
-    figures: tuple = ()
-    own: tuple = ()
-    tables: tuple = ()
+    figures: tuple[tuple[str, str], ...] = ()
+    own: tuple[tuple[str, str, str], ...] = ()
+    tables: tuple[Shown, ...] = ()
 
 
 _LEAST_SQUARES = "method in ('least_squares', 'none')"

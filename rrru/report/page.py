@@ -6,14 +6,17 @@ import os
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import jinja2
+import pandas as pd
 
 from rrru.report import cards, cells, contents, svg
 from rrru.report.trust import trust
-from rrru.report.worth import worth
+from rrru.report.worth import Worth, worth
 from rrru.store import json_files, tables
 from rrru.store.atomic_write import write_text
+from rrru.store.schema import Table
 from rrru.studies import glossary
 
 TEMPLATES = Path(__file__).parent / "templates"
@@ -42,8 +45,8 @@ class Part:
     key: str
     title: str
     about: str
-    pictures: list
-    grids: list
+    pictures: list[Picture]
+    grids: list[cells.Grid]
 
 
 @dataclass(frozen=True)
@@ -57,42 +60,43 @@ class Results:
     folder: Path
     reproduced: str
     campaign: str | None = None
-    glyphs: dict = field(default_factory=dict)
+    glyphs: dict[str, str] = field(default_factory=dict)
 
     @cached_property
-    def schemas(self):
+    def schemas(self) -> dict[str, Table]:
         """All tables that the package knows, by name."""
-        return glossary.tables()
+        known: dict[str, Table] = glossary.tables()
+        return known
 
-    def place(self, name):
+    def place(self, name: str) -> Path:
         """Path of a table."""
         if self.campaign:
             return self.folder / "campaigns" / self.campaign / f"{name}.parquet"
         return self.folder / "tables" / f"{name}.parquet"
 
-    def frame(self, name):
+    def frame(self, name: str) -> pd.DataFrame | None:
         """A table as a frame, None where it was not made or holds nothing."""
         place = self.place(name)
         frame = tables.read(place) if place.is_file() else None
         return None if frame is None or frame.empty else frame
 
-    def campaigns(self):
+    def campaigns(self) -> list[str]:
         """Campaigns that the last run has diagnosed, measured ones first."""
         frame, sources = self.frame("gap_verdicts"), self.sources()
         names = [] if frame is None else frame["campaign"]
         return sorted(names, key=lambda name: (not sources.get(name, "").startswith("file"), name))
 
-    def owners(self):
+    def owners(self) -> set[str]:
         """Names whose figures belong to this run: other figures in the folder may be of an earlier run."""
         frame = self.frame("real_verdicts")
         return {self.reproduced, *self.campaigns(), *(() if frame is None else frame["dataset"])}
 
-    def sources(self):
+    def sources(self) -> dict[str, str]:
         """Where each campaign came from, by name."""
         frame = self.frame("campaigns")
         return {} if frame is None else dict(zip(frame["campaign"], frame["source"], strict=True))
 
-    def worth(self, name, noise_rms_mm):
+    def worth(self, name: str, noise_rms_mm: float) -> Worth | None:
         """The Worth of a campaign's calibration, None where the tables of it were not made."""
         errors, campaigns = self.frame("errors"), self.frame("campaigns")
         place = self.folder / "campaigns" / name / "gap_points.parquet"
@@ -101,17 +105,17 @@ class Results:
         registered = campaigns.set_index("campaign")["registration_rms_mm"].notna().get(name, False)
         return worth(errors[errors["campaign"] == name], tables.read(place), noise_rms_mm, bool(registered))
 
-    def models(self, name, start):
+    def models(self, name: str, start: Path) -> list[str]:
         """Links to the robot's corrected file from the folder start; empty for a robot without a file."""
         found = sorted((self.folder / "campaigns" / name).glob("corrected.*"))
         return [os.path.relpath(place, start) for place in found]
 
-    def drives(self, name, start):
+    def drives(self, name: str, start: Path) -> str:
         """Link to the robot's `corrected_drives` from the folder start; empty where there are none."""
         place = self.folder / "campaigns" / name / "corrected_drives.parquet"
         return os.path.relpath(place, start) if place.is_file() and len(tables.read(place)) else ""
 
-    def picture(self, name, title):
+    def picture(self, name: str, title: str) -> Picture | None:
         """A figure of a path below figures/ without its ending, None where it was not drawn."""
         place = self.folder / "figures" / f"{name}.svg"
         if not place.is_file():
@@ -127,7 +131,7 @@ class Results:
             key, title, caption, f'<img alt="{html.escape(title)}" src="data:image/png;base64,{data}">', drawn.width
         )
 
-    def grid(self, shown):
+    def grid(self, shown: contents.Shown) -> cells.Grid | None:
         """A table of the page, None where there is nothing to show."""
         frame = self.frame(shown.name)
         if frame is None:
@@ -141,7 +145,7 @@ class Results:
         return made if made.rows else None
 
 
-def write(folder, path, reproduced, campaign=None):
+def write(folder: str | Path, path: str | Path, reproduced: str, campaign: str | None = None) -> None:
     """Write the page of a folder of results, or of one of its campaigns, as a whole or not at all; see Results."""
     results = Results(Path(folder), reproduced, campaign)
     names = results.campaigns()
@@ -160,20 +164,21 @@ def write(folder, path, reproduced, campaign=None):
     save(render("report.html", **values), path)
 
 
-def render(template, **values):
+def render(template: str, **values: Any) -> str:
     """A page of a template of this folder."""
     loader = jinja2.FileSystemLoader(TEMPLATES)
-    strict = {"undefined": jinja2.StrictUndefined, "trim_blocks": True, "lstrip_blocks": True}
-    environment = jinja2.Environment(loader=loader, autoescape=True, **strict)
+    environment = jinja2.Environment(
+        loader=loader, autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
     return environment.get_template(template).render(**values)
 
 
-def save(text, path):
+def save(text: str, path: str | Path) -> None:
     """Write a page as a whole or not at all."""
     write_text(text, path)
 
 
-def _part(results, section):
+def _part(results: Results, section: contents.Section) -> Part | None:
     """A section with its pictures and tables, None where there are none."""
     wanted = [(name, title) for name, title in section.figures] if results.campaign is None else []
     wanted += [found for own in section.own for found in _of_campaigns(results, *own)]
@@ -184,7 +189,7 @@ def _part(results, section):
     return Part(section.key, section.title, section.about, pictures, grids) if pictures or grids else None
 
 
-def _of_campaigns(results, name, title, needed):
+def _of_campaigns(results: Results, name: str, title: str, needed: str) -> list[tuple[str, str]]:
     """Places and titles of a figure of every campaign that has rows in the needed table, where one is."""
     folder = results.folder / "figures"
     found = [place.relative_to(folder).with_suffix("") for place in sorted(folder.rglob(f"{name}.svg"))]
@@ -196,7 +201,7 @@ def _of_campaigns(results, name, title, needed):
     return [(place, f"{owner}: {title}") for place, owner in owners if owner in known]
 
 
-def _trust(results):
+def _trust(results: Results) -> cells.Grid | None:
     """The table of which parameters may be trusted, None where nothing was calibrated."""
     frames = [results.frame(name) for name in _TRUST]
     if any(frame is None for frame in frames):

@@ -9,8 +9,8 @@ _FRACTION = re.compile(r"(\d+\.\d\d)\d+")
 _ID = re.compile(r' id="([^"]+)"')
 _REFERENCE = re.compile(r'(xlink:href="#|url\(#)([^")]+)')
 _GLYPH = re.compile(r'<path id="(DejaVu[^"]+)"[^>]*/>')
-_DROPPED = (r"<\?xml.*?\?>", r"<!DOCTYPE.*?>", r"<metadata>.*?</metadata>", r"<style.*?</style>", r"<!--.*?-->")
-_DROPPED = re.compile("|".join(_DROPPED), re.DOTALL)
+_DROPPED_PARTS = (r"<\?xml.*?\?>", r"<!DOCTYPE.*?>", r"<metadata>.*?</metadata>", r"<style.*?</style>", r"<!--.*?-->")
+_DROPPED = re.compile("|".join(_DROPPED_PARTS), re.DOTALL)
 _CAPTION = re.compile(r"<dc:description>(.*?)</dc:description>", re.DOTALL)
 _SIZE = re.compile(r'<svg [^>]*?width="([\d.]+)pt" height="([\d.]+)pt"[^>]*>')
 _POINTS_PER_PIXEL = 0.75
@@ -21,22 +21,22 @@ class Inline:
     """markup: the SVG element without its glyphs; glyphs: their elements by name; width: in pixels of the page."""
 
     markup: str
-    glyphs: dict
+    glyphs: dict[str, str]
     width: int
 
 
-def caption(text):
+def caption(text: str) -> str:
     """What a figure's file says that it shows; empty where it says nothing."""
     found = _CAPTION.search(text)
     return html.unescape(" ".join(found[1].split())) if found else ""
 
 
-def inline(text, name, label):
+def inline(text: str, name: str, label: str) -> Inline:
     """The text of an SVG file of this package as an Inline.
 
     name: what the names inside begin with, so that they are the page's only ones; label: what a screen reader says.
     """
-    width, height = map(float, _SIZE.search(text).groups())
+    width, height = map(float, _SIZE.findall(text)[0])
     glyphs = dict((found[1], found[0]) for found in _GLYPH.finditer(text))
     body = _SIZE.sub("", _GLYPH.sub("", _DROPPED.sub("", text)))
     body = _FRACTION.sub(r"\1", " ".join(body.split())).replace("> <", "><").replace("<defs></defs>", "")

@@ -1,5 +1,8 @@
 """Which parameters of a calibration may be trusted, in words. Values in mm and rad."""
 
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
 import pandas as pd
 
 from rrru.diagnosis.verdict_text import rounded, with_interval
@@ -12,7 +15,13 @@ _NO_EFFECTS = ("none", "unexplained")
 COLUMNS = ["campaign", "parameter", "value", "judgement", "with_effects", "true_value", "calibration", "points"]
 
 
-def trust(parameters, correlations, calibrations, corrected, verdicts):
+def trust(
+    parameters: pd.DataFrame,
+    correlations: pd.DataFrame,
+    calibrations: pd.DataFrame,
+    corrected: pd.DataFrame,
+    verdicts: pd.DataFrame,
+) -> pd.DataFrame:
     """A row per campaign and parameter of its calibration on most points, least squares: value, interval and judgement.
 
     corrected: rows of `gap_parameters`, the parameters with the effects in the model;
@@ -27,7 +36,7 @@ def trust(parameters, correlations, calibrations, corrected, verdicts):
     moved = with_effects.query("effect == 'calibration'")[["campaign", "parameter", "value", "low_95", "high_95"]]
     rows = rows.merge(moved.rename(columns={"value": "moved"}), how="left", on=["campaign", "parameter"])
     rows = rows.assign(unexplained=rows["campaign"].map(answers).fillna("").str.contains("unexplained"))
-    said = {
+    said: dict[str, Callable[[Mapping[str, Any]], str | None]] = {
         "value": _value,
         "judgement": lambda row: _judged(row, _tied(row, correlations)),
         "with_effects": lambda row: _interval(row["moved"], row["low_95"], row["high_95"], row["unit"]),
@@ -36,25 +45,25 @@ def trust(parameters, correlations, calibrations, corrected, verdicts):
     return rows.assign(**{name: [say(row) for row in rows.to_dict("records")] for name, say in said.items()})[COLUMNS]
 
 
-def _plain(value, unit):
+def _plain(value: float, unit: str) -> str | None:
     """A number with its unit, None where there is none."""
     return None if pd.isna(value) else f"{rounded(value, 3)} {unit}".replace("-", MINUS)
 
 
-def _value(row):
+def _value(row: Mapping[str, Any]) -> str | None:
     """A number with its unit and its 95 % interval."""
     half = QUANTILE_95 * row["standard_error"]
     return _interval(row["value"], row["value"] - half, row["value"] + half, row["unit"])
 
 
-def _interval(value, low, high, unit):
+def _interval(value: float, low: float, high: float, unit: str) -> str | None:
     """A number with its unit and its 95 % interval, without one where there is none."""
     if not high > low:
         return _plain(value, unit)
-    return with_interval(value, low, high, unit).replace("-", MINUS)
+    return str(with_interval(value, low, high, unit).replace("-", MINUS))
 
 
-def _judged(row, tied):
+def _judged(row: Mapping[str, Any], tied: Sequence[str]) -> str:
     """What a user may do with one number; tied: parameters that the points see only together with it."""
     error = _CLEAR * row["standard_error"]
     if not row["seen"]:
@@ -70,7 +79,7 @@ def _judged(row, tied):
     return "use: differs from the drawing" if abs(row["value"]) > error else "use: as drawn, within its error"
 
 
-def _tied(row, correlations):
+def _tied(row: Mapping[str, Any], correlations: pd.DataFrame) -> list[str]:
     """Parameters whose estimates nearly rise and fall with this one's."""
     of_row = (correlations["campaign"] == row["campaign"]) & (correlations["calibration"] == row["calibration"])
     strong = correlations[of_row & (correlations["correlation"].abs() > _TOGETHER)]

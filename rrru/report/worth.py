@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+import pandas as pd
+
 from rrru.diagnosis.shrink import gap_rms
 from rrru.diagnosis.verdict_text import rounded
 
@@ -20,7 +22,7 @@ class Worth:
     registered: bool
 
 
-def worth(errors, points, noise_rms_mm, registered):
+def worth(errors: pd.DataFrame, points: pd.DataFrame, noise_rms_mm: float, registered: bool) -> Worth | None:
     """The Worth of a campaign, None where none of its points has an error before calibration.
 
     errors: rows of `errors` of the campaign; points: `gap_points`; noise_rms_mm: 3-D.
@@ -30,11 +32,11 @@ def worth(errors, points, noise_rms_mm, registered):
     if both.empty:
         return None
     seen = (both[[f"before_{axis}_mm" for axis in _AXES]] ** 2).sum(axis=1)
-    sizes = (gap_rms(squares - noise_rms_mm**2) for squares in (both["error_mm"] ** 2, seen))
-    return Worth(len(both), *sizes, registered)
+    before_mm, seen_mm = (gap_rms(squares - noise_rms_mm**2) for squares in (both["error_mm"] ** 2, seen))
+    return Worth(len(both), before_mm, seen_mm, registered)
 
 
-def sentences(found, left_out_mm):
+def sentences(found: Worth, left_out_mm: float) -> list[str]:
     """Sentences on a Worth; left_out_mm: residual error at points that were left out of the calibration."""
     registered = ", after registration of the instrument's frame" if found.registered else ""
     size = f"{rounded(found.before_mm)} mm rms{registered} (distance in space, noise subtracted)"

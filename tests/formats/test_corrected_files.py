@@ -209,6 +209,17 @@ def test_tool_and_reflectors_are_frames_on_the_platform(tmp_path):
     assert place.find("parent").get("link") == "tool0" and place.find("origin").get("xyz") == "0.001 0.002 0.003"
 
 
+def test_a_frame_on_the_tip_without_an_origin_gets_one(tmp_path):
+    found = Found({"tool": np.array([1.0, 2.0, 3.0, 0.0, 0.0, 0.0])})
+    root = ElementTree.fromstring(to_urdf(ARM, found, tmp_path)[0])
+    mount = next(one for one in root.iter("joint") if one.get("name") == "measured_tool_mount")
+    mount.remove(mount.find("origin"))
+    path = _written(tmp_path, ElementTree.tostring(root, encoding="unicode"), "urdf")
+    again = ElementTree.fromstring(to_urdf(path, found, tmp_path, tip="tool0")[0])
+    mount = next(one for one in again.iter("joint") if one.get("name") == "measured_tool_mount")
+    assert mount.find("origin").attrib == {"xyz": "0.001 0.002 0.003", "rpy": "0 0 0"}
+
+
 def test_files_beside_a_urdf_are_found_from_the_new_place_and_plugins_keep_their_names(tmp_path):
     extra = (
         '<gazebo><plugin name="control" filename="libgazebo_ros2_control.so"/></gazebo>'

@@ -5,14 +5,20 @@ import io
 import json
 import re
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from datetime import date, time
+from decimal import Decimal
 from pathlib import Path
+from typing import TYPE_CHECKING, TypeAlias
 from xml.etree.ElementTree import ParseError
 from zipfile import BadZipFile
 from zlib import error as ZlibError
 
 from rrru.campaign.ingest.problems import Problems
+
+if TYPE_CHECKING:
+    from openpyxl.worksheet.worksheet import Worksheet
 
 _SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "bars", " ": "spaces"}
 _SIGNATURES = (
@@ -33,6 +39,10 @@ _BROKEN = (BadZipFile, ParseError, ZlibError, OSError, EOFError)
 _INCONSISTENT = (KeyError, ValueError, TypeError, AttributeError, IndexError, AssertionError, NotImplementedError)
 
 
+# a cell as its file's format gives it, None where it is blank
+Cell: TypeAlias = str | float | int | bool | Decimal | date | time | None
+
+
 @dataclass(frozen=True)
 class Cells:
     """Cells of a file: names of its columns, numbers of its n rows as an editor shows them, {name: cells (n,)}.
@@ -44,11 +54,11 @@ class Cells:
 
     names: list[str]
     rows: list[int]
-    cells: Mapping[str, Sequence]
+    cells: Mapping[str, Sequence[Cell]]
     means: Mapping[str, str] = field(default_factory=dict)
     factors: Mapping[str, float] = field(default_factory=dict)
     spreads: Mapping[str, float] = field(default_factory=dict)
-    commas: frozenset = frozenset()
+    commas: frozenset[str] = frozenset()
     unused: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
 
@@ -66,12 +76,17 @@ def read_bytes(path: Path, problems: Problems) -> bytes:
         problems.refuse_now(value=error.strerror or str(error), allowed="a file that can be read")
 
 
-def looks_like(data):
+def looks_like(data: bytes) -> str | None:
     """Name of the file format that the first bytes give away, or None."""
     return next((name for signature, name in _SIGNATURES if data.startswith(signature)), None)
 
 
-def text_cells(data, problems, separator=None, decimal="."):
+def _contents(data: bytes) -> str:
+    """What a file holds that has not the format that it should have."""
+    return looks_like(data) or (f"text or other data ({data[:30]!r})" if data else "an empty file")
+
+
+def text_cells(data: bytes, problems: Problems, separator: str | None = None, decimal: str = ".") -> Cells:
     """Cells of a CSV file's bytes.
 
     Rows with another number of fields than the header are noted and left out, as are empty lines at the end. Raises
@@ -82,7 +97,7 @@ def text_cells(data, problems, separator=None, decimal="."):
     return table(names, rows, lines, problems, frozenset(names if decimal == "," else ()))
 
 
-def fields(text, separator, problems):
+def fields(text: str, separator: str, problems: Problems) -> tuple[list[list[str]], list[int]]:
     """Stripped fields of each row of a text, and the number of the line in which each begins."""
     body = text.lstrip("\r\n")
     reader = csv.reader(io.StringIO(body, newline=""), strict=True, delimiter=separator)
@@ -99,7 +114,13 @@ def fields(text, separator, problems):
     return rows, lines
 
 
-def table(names, rows, numbers, problems, commas=frozenset()):
+def table(
+    names: list[str],
+    rows: Sequence[Sequence[Cell]],
+    numbers: Iterable[int],
+    problems: Problems,
+    commas: frozenset[str] = frozenset(),
+) -> Cells:
     """Cells of rows of fields below the names of the columns; numbers: of the rows, as an editor shows them."""
     while rows and not any(map(_filled, rows[-1])):
         rows = rows[:-1]
@@ -114,7 +135,7 @@ def table(names, rows, numbers, problems, commas=frozenset()):
     return Cells(names, [number for number, _ in complete], dict(zip(names, columns, strict=True)), commas=commas)
 
 
-def decode(data, problems, allowed=_TEXT, others=()):
+def decode(data: bytes, problems: Problems, allowed: str = _TEXT, others: Sequence[str] = ()) -> str:
     """Text of the bytes; a UTF-8 byte-order mark is accepted. others: encodings that are tried besides UTF-8."""
     if known := looks_like(data):
         problems.refuse_now(value=known, allowed=allowed)
@@ -142,19 +163,19 @@ def decode(data, problems, allowed=_TEXT, others=()):
     return text
 
 
-def separator_of(lines, decimal="."):
+def separator_of(lines: Sequence[str], decimal: str = ".") -> str:
     """The separator that the first of some lines has, " " where it has none of the usual ones."""
     first = lines[0] if lines else ""
     return next((one for one in ";\t,|" if one in first and one != decimal), " ")
 
 
-def declared(separator, text):
+def declared(separator: str, text: str) -> str:
     """Text: what to write into the configuration for a separator other than a comma."""
     decimal = ', decimal: ","' if separator != "," and re.search(r"\d,\d", text) else ""
     return f"format: {{kind: csv, separator: {json.dumps(separator)}{decimal}}}"
 
 
-def _require_header(names, rows, separator, problems):
+def _require_header(names: list[str], rows: Sequence[Sequence[str]], separator: str, problems: Problems) -> None:
     """Refuse a first line that is no header or has another separator."""
     widths = [len(row) for row in rows if row]
     for other, word in _SEPARATORS.items():
@@ -171,7 +192,7 @@ def _require_header(names, rows, separator, problems):
         problems.refuse_now(value=value, allowed=allowed + _TWO_FIELDS)
 
 
-def _is_number(text):
+def _is_number(text: str) -> bool:
     """Whether a text reads as a number."""
     try:
         float(text)
@@ -180,12 +201,12 @@ def _is_number(text):
     return True
 
 
-def _filled(cell):
+def _filled(cell: Cell) -> bool:
     """Whether a cell is not empty."""
     return cell is not None and cell != ""
 
 
-def _is_whole(number, row, width, problems):
+def _is_whole(number: int, row: Sequence[Cell], width: int, problems: Problems) -> bool:
     """Whether a row has as many fields as the header; others, and empty ones, are noted."""
     filled = any(map(_filled, row))
     if not filled:
@@ -198,14 +219,14 @@ def _is_whole(number, row, width, problems):
     return filled and len(row) == width
 
 
-def parquet_cells(data, problems):
+def parquet_cells(data: bytes, problems: Problems) -> Cells:
     """Cells of a parquet file's bytes; the columns that pandas adds for its index are left out."""
     import pyarrow
     import pyarrow.parquet
 
     if not data.startswith(b"PAR1"):
-        seen = looks_like(data) or (f"text or other data ({data[:30]!r})" if data else "an empty file")
-        problems.refuse_now(value=seen, allowed="a parquet file; comma-separated text has the extension .csv")
+        allowed = "a parquet file; comma-separated text has the extension .csv"
+        problems.refuse_now(value=_contents(data), allowed=allowed)
     try:
         frame = pyarrow.parquet.ParquetFile(pyarrow.BufferReader(data)).read()
         names = [name for name in frame.column_names if not re.fullmatch(r"__index_level_\d+__", name)]
@@ -220,14 +241,13 @@ def parquet_cells(data, problems):
     return Cells(names, list(range(1, frame.num_rows + 1)), cells)
 
 
-def xlsx_cells(data, problems, sheet=None):
+def xlsx_cells(data: bytes, problems: Problems, sheet: str | None = None) -> Cells:
     """Cells of a workbook's bytes: those of the named sheet, or of the only one that holds anything."""
     from openpyxl import load_workbook
     from openpyxl.utils.exceptions import InvalidFileException
 
     if not data.startswith(b"PK\x03\x04"):
-        seen = looks_like(data) or (f"text or other data ({data[:30]!r})" if data else "an empty file")
-        problems.refuse_now(value=seen, allowed="an .xlsx workbook")
+        problems.refuse_now(value=_contents(data), allowed="an .xlsx workbook")
     try:
         with warnings.catch_warnings(action="ignore"):
             book = load_workbook(io.BytesIO(data), data_only=True)
@@ -244,13 +264,13 @@ def xlsx_cells(data, problems, sheet=None):
         problems.refuse_now(value=value if sheet is None else f"{value}, no {sheet!r}", allowed=allowed)
     if not filled[sheet]:
         problems.refuse_now(value=f"the sheet {sheet!r}, which is empty", allowed="a header and one row per point")
-    names, *rows = filled[sheet]
+    header, *rows = filled[sheet]
     first = 2 + next(i for i, row in enumerate(book[sheet].iter_rows(values_only=True)) if any(map(_holds_value, row)))
-    names = ["" if name is None else str(name).strip() for name in names]
+    names = ["" if name is None else str(name).strip() for name in header]
     return table(names, rows, range(first, first + len(rows)), problems)
 
 
-def _rows(sheet):
+def _rows(sheet: "Worksheet") -> list[list[Cell]]:
     """Rows of a sheet's cells from its first row that holds any, without empty columns at its right end."""
     rows = [list(row) for row in sheet.iter_rows(values_only=True)]
     rows = rows[next((i for i, row in enumerate(rows) if any(_holds_value(cell) for cell in row)), len(rows)) :]
@@ -258,6 +278,6 @@ def _rows(sheet):
     return [row[:last] for row in rows]
 
 
-def _holds_value(cell):
+def _holds_value(cell: Cell) -> bool:
     """Whether a cell of a workbook holds more than spaces."""
     return cell is not None and str(cell).strip() != ""

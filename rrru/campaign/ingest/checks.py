@@ -1,9 +1,12 @@
 """Checks of a measured campaign's rows as runs: numbering, order, time, copies, number of points."""
 
+from collections.abc import Iterator, Sequence
+
 import numpy as np
+import pandas as pd
 
 from rrru.campaign.driven_path import follows_path
-from rrru.campaign.ingest.sheet import COMMAND, MEASURED
+from rrru.campaign.ingest.sheet import COMMAND, MEASURED, Sheet
 
 _LEAST_POINTS = 3
 # stale readings that are left out make at most this share of a file; more are no mishap of an instrument
@@ -14,7 +17,7 @@ _POINT = {"run", "trajectory", "point"}
 _COARSE_MM = 0.005
 
 
-def number_runs(frame, at_rest=False):
+def number_runs(frame: pd.DataFrame, at_rest: bool = False) -> tuple[pd.DataFrame, list[str]]:
     """The frame with `run` and `point`, and what was done to get them; at_rest: the robot rests at each reading.
 
     Without a `run` a new one begins where the trajectory's name changes and where the point's number falls or, without
@@ -47,14 +50,14 @@ def number_runs(frame, at_rest=False):
     return frame, notes
 
 
-def path_length(command):
+def path_length(command: np.ndarray) -> np.ndarray:
     """Length in mm along commanded positions (n, 3), growing by at least a little where the robot stands still."""
     step = np.nan_to_num(np.linalg.norm(np.diff(command, axis=0), axis=1))
     least = 0.2 * np.median(step[step > 0.0]) if (step > 0.0).any() else 1.0
     return np.concatenate([[0.0], np.cumsum(np.maximum(step, least))])
 
 
-def _turns_back(command, change):
+def _turns_back(command: np.ndarray, change: np.ndarray) -> np.ndarray:
     """Rows (n,) where positions (n, 3) turn back or start again within what `change` (n,) sets apart."""
     result = np.zeros(len(command), dtype=bool)
     last, begun = None, 0
@@ -75,14 +78,14 @@ def _turns_back(command, change):
     return result
 
 
-def resolution(position):
+def resolution(position: np.ndarray) -> float:
     """Last digit of positions (n, 3) as the file has them: 0.001 for three decimals."""
     known = position[np.isfinite(position)]
     digits = (10.0**-d for d in range(7) if np.allclose(known, np.round(known, d), rtol=0.0, atol=1e-3 * 10.0**-d))
     return next(digits, 1e-7)
 
 
-def check_runs(sheet, repeated):
+def check_runs(sheet: Sheet, repeated: pd.Series) -> None:
     """Note rows that do not make sense as runs; repeated: the `stale` readings."""
     _check_repeats(sheet)
     _check_order(sheet)
@@ -92,18 +95,18 @@ def check_runs(sheet, repeated):
         _check_time(sheet)
 
 
-def _first_alike(frame, columns):
+def _first_alike(frame: pd.DataFrame, columns: Sequence[str]) -> pd.Series:
     """The first row (n,) with the same values as each row in some columns."""
     return frame.index.to_series().groupby([frame[name] for name in columns]).transform("first")
 
 
-def _falls(frame, where):
+def _falls(frame: pd.DataFrame, where: pd.Series) -> Iterator[tuple[int, pd.Series, pd.Series]]:
     """The flagged rows (n,) of a frame: their number, the row itself and the one before."""
     for i in np.flatnonzero(where):
         yield frame.index[i], frame.iloc[i], frame.iloc[i - 1]
 
 
-def _check_repeats(sheet):
+def _check_repeats(sheet: Sheet) -> None:
     """Note points that stand twice, by number and run."""
     known = sheet.frame.dropna(subset=["run", "point"])
     first = _first_alike(known, ("run", "point"))
@@ -112,7 +115,7 @@ def _check_repeats(sheet):
         sheet.note("repeated point", ("run", "point"), value, "each point of a run once", row)
 
 
-def _check_order(sheet):
+def _check_order(sheet: Sheet) -> None:
     """Note runs and points that go back, and runs over two trajectories: the rows stand in the order driven."""
     known = sheet.frame.dropna(subset=["run", "point"])
     for row, now, before in _falls(known, known["run"].diff() < 0):
@@ -128,7 +131,7 @@ def _check_order(sheet):
             sheet.note("two trajectories", "trajectory", value, "one trajectory per run", other.index[0])
 
 
-def stale(sheet, digit_mm):
+def stale(sheet: Sheet, digit_mm: float) -> pd.Series:
     """Rows that repeat an earlier reading in every digit: a series of the earlier row's number by theirs.
 
     At the same command only where the file's resolution excludes equality by chance; digit_mm: last digit of its
@@ -140,7 +143,7 @@ def stale(sheet, digit_mm):
     return first[(first != known.index) & (elsewhere | (digit_mm < _COARSE_MM))]
 
 
-def _check_copies(sheet, first):
+def _check_copies(sheet: Sheet, first: pd.Series) -> None:
     """Note `stale` rows, with the first of each, where there are many; a few are left out."""
     if len(first) <= _MOST_STALE * len(sheet.frame):
         return
@@ -151,7 +154,7 @@ def _check_copies(sheet, first):
         )
 
 
-def _check_counts(sheet):
+def _check_counts(sheet: Sheet) -> None:
     """Note a campaign or a run with too few rows."""
     parameters = len(sheet.mechanism.parameters)
     needed = max(-(-parameters // 3), _LEAST_POINTS)
@@ -165,7 +168,7 @@ def _check_counts(sheet):
             sheet.note("too few points", "run", f"run {number:g} with {size} points", allowed)
 
 
-def _check_time(sheet):
+def _check_time(sheet: Sheet) -> None:
     """Note times that run backwards, within a run or from run to run."""
     known = sheet.frame.dropna(subset=["time_s", "run"])
     for row, now, before in _falls(known, known["time_s"].diff() < 0):
@@ -175,7 +178,7 @@ def _check_time(sheet):
         sheet.note("time", "time_s", value, allowed, row)
 
 
-def check_speed(sheet):
+def check_speed(sheet: Sheet) -> None:
     """Note runs whose points follow each other faster than their speed allows, in a file whose unit is right."""
     if not {"time_s", "speed_mm_s"} <= set(sheet.frame):
         return

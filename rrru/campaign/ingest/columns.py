@@ -2,16 +2,21 @@
 
 import difflib
 import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from decimal import Decimal
+from typing import TypeAlias
 
 import numpy as np
 import pandas as pd
 
+from rrru.campaign.ingest.cells import Cell, Cells
 from rrru.campaign.ingest.clock import is_clock, seconds
 from rrru.campaign.ingest.orientations import check_orientations
+from rrru.campaign.ingest.problems import Problems
 from rrru.campaign.ingest.sheet import COMMAND, MEASURED, NOISE, QUATERNIONS, TURNS, drive_name
-from rrru.campaign.ingest.spec import MM, RAD
+from rrru.campaign.ingest.spec import MM, RAD, IngestSpec
 from rrru.campaign.ingest.trackers import unit_of
+from rrru.kinematics.robot import Robot
 
 REQUIRED = ("trajectory", *COMMAND, *MEASURED)
 _GROUPS = (*TURNS.values(), *QUATERNIONS.values(), NOISE)
@@ -23,10 +28,11 @@ _BEFORE_DRIVES, _AFTER_DRIVES = ("run", "point", "time_s"), ("speed_mm_s", "payl
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 _DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+([eE][+-]?\d+)?", re.ASCII)
 _LARGEST = 1e12
-_COUNTED = (lambda v: (v >= 1) & (v <= 1e9) & (v == v.round()), "a whole number: 1, 2, 3, ...")
+_Limit: TypeAlias = tuple[Callable[[pd.Series], pd.Series], str]
+_COUNTED: _Limit = (lambda v: (v >= 1) & (v <= 1e9) & (v == v.round()), "a whole number: 1, 2, 3, ...")
 # ASSUME what a parallel robot of about a metre can carry and how fast it can go, and campaigns of less than 12 days:
 # clock times show.
-_LIMITS = {
+_LIMITS: dict[str, _Limit] = {
     "run": _COUNTED,
     "point": _COUNTED,
     "time_s": (lambda v: (v >= 0) & (v <= 1e6), "0 to 1e6 s since the campaign's start"),
@@ -44,12 +50,14 @@ _OTHER_UNITS = {
 }
 
 
-def known_columns(mechanism):
+def known_columns(mechanism: Robot) -> tuple[str, ...]:
     """Our names of all columns that a robot's file may have."""
     return (*REQUIRED, *_BEFORE_DRIVES, *mechanism.parts.columns, *_AFTER_DRIVES, *_MORE)
 
 
-def resolve(spec, cells, mechanism, problems, guessed=None):
+def resolve(
+    spec: IngestSpec, cells: Cells, mechanism: Robot, problems: Problems, guessed: Mapping[str, str] | None = None
+) -> tuple[dict[str, str], list[str]]:
     """{our name: the file's name} of the columns that a file's Cells have, and the undeclared columns.
 
     guessed: {our name: the file's name} of what undeclared columns look like, which messages propose. Missing columns,
@@ -101,7 +109,9 @@ def resolve(spec, cells, mechanism, problems, guessed=None):
     return found, extra
 
 
-def convert(spec, mechanism, found, file, problems):
+def convert(
+    spec: IngestSpec, mechanism: Robot, found: Mapping[str, str], file: Cells, problems: Problems
+) -> pd.DataFrame:
     """Frame of our columns in mm and rad, indexed by the row numbers (n,); NaN, or "" as a name, where a cell is noted.
 
     found: {our name: the file's name}; file: its Cells. An optional column without any value is left out.
@@ -136,9 +146,9 @@ def convert(spec, mechanism, found, file, problems):
     return check_orientations(frame, found, problems)
 
 
-def _blank_groups(found, cells, count):
+def _blank_groups(found: Mapping[str, str], cells: Mapping[str, Sequence[Cell]], count: int) -> dict[str, np.ndarray]:
     """By column of an orientation the rows (n,) that have none: all its cells are blank."""
-    result = {}
+    result: dict[str, np.ndarray] = {}
     for group in _GROUPS:
         if set(group) <= set(found):
             empty = [all(_blank(cells[found[name]][i]) for name in group) for i in range(count)]
@@ -146,7 +156,7 @@ def _blank_groups(found, cells, count):
     return result
 
 
-def _check_limits(frame, found, problems):
+def _check_limits(frame: pd.DataFrame, found: Mapping[str, str], problems: Problems) -> None:
     """Note numbers beyond their limits and put NaN in their place."""
     for name, (holds, allowed) in _LIMITS.items():
         if name not in frame:
@@ -157,25 +167,24 @@ def _check_limits(frame, found, problems):
         frame.loc[beyond, name] = np.nan
 
 
-def _numbers(cells, rows, theirs, skip, problems, comma):
+def _numbers(
+    cells: Sequence[Cell], rows: Sequence[int], theirs: str, skip: np.ndarray, problems: Problems, comma: bool
+) -> np.ndarray:
     """Column (n,) of floats; NaN where a cell is skipped or noted as no number; comma: texts have decimal commas."""
     values = np.full(len(cells), np.nan)
-    for i in np.flatnonzero(~skip):
-        if fault := _fault(cells[i], comma):
-            problems.add(f"no number in {theirs}", row=rows[i], column=theirs, value=_shown(cells[i]), allowed=fault)
+    for i in np.flatnonzero(~skip).tolist():
+        number = _number(cells[i], comma)
+        if isinstance(number, str):
+            problems.add(f"no number in {theirs}", row=rows[i], column=theirs, value=_shown(cells[i]), allowed=number)
         else:
-            values[i] = _number(cells[i], comma)
+            values[i] = number
     return values
 
 
-def _number(cell, comma):
-    """A cell's number."""
-    return float(cell.replace(",", ".") if comma and isinstance(cell, str) else cell)
-
-
-def _fault(cell, comma):
-    """Text: the expected content of a cell without a finite number, else None."""
-    if _blank(cell):
+def _number(cell: Cell, comma: bool) -> float | str:
+    """A cell's number; for a cell without a finite one a text, the expected content."""
+    number = np.inf
+    if cell is None or _blank(cell):
         return "a number; drop a row that lacks one"
     if isinstance(cell, str):
         text = cell.strip()
@@ -183,13 +192,15 @@ def _fault(cell, comma):
             return "a number with a decimal comma, as the format says, not a point"
         if not comma and _DECIMAL_COMMA.fullmatch(text):
             return "a number with a decimal point, not a comma"
-        number = _NUMBER.fullmatch(text.replace(",", ".") if comma else text)
-    else:
-        number = isinstance(cell, (int, float, Decimal)) and not isinstance(cell, bool)
-    return None if number and abs(_number(cell, comma)) < _LARGEST else "a finite number"
+        text = text.replace(",", ".") if comma else text
+        if _NUMBER.fullmatch(text):
+            number = float(text)
+    elif isinstance(cell, (int, float, Decimal)) and not isinstance(cell, bool):
+        number = float(cell)
+    return number if abs(number) < _LARGEST else "a finite number"
 
 
-def _names(ours, cells, rows, theirs, problems):
+def _names(ours: str, cells: Sequence[Cell], rows: Sequence[int], theirs: str, problems: Problems) -> list[str]:
     """Names of trajectories or reflectors as text, "" where a cell is noted."""
     names = ["" if _blank(cell) else str(cell).strip() for cell in cells]
     for row, cell, name in zip(rows, cells, names, strict=True):
@@ -199,23 +210,23 @@ def _names(ours, cells, rows, theirs, problems):
     return names
 
 
-def _blank(cell):
+def _blank(cell: Cell) -> bool:
     """Whether a cell is empty."""
     return cell is None or (isinstance(cell, str) and not cell.strip())
 
 
-def _shown(cell):
+def _shown(cell: Cell) -> str:
     """A cell as it stands in the file, text in quotes."""
     return "blank" if _blank(cell) else repr(cell) if isinstance(cell, str) else str(cell)
 
 
-def _nearest(name, candidates):
+def _nearest(name: str, candidates: Iterable[str]) -> str | None:
     """The candidate that looks most like a name, or None."""
     lowered = {candidate.lower(): candidate for candidate in candidates if candidate}
     near = difflib.get_close_matches(name.lower(), lowered, n=1, cutoff=0.75)
     return lowered[near[0]] if near else None
 
 
-def _advice(ours, theirs):
+def _advice(ours: str | None, theirs: str | None) -> str:
     """The `columns` entry that maps the file's name to ours."""
     return f'; if {theirs!r} is meant as {ours}: columns: {{{ours}: "{theirs}"}}' if ours and theirs else ""

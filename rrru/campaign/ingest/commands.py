@@ -6,26 +6,35 @@ in the groups of a point list, are distinguished by the trajectory.
 """
 
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import TypeAlias
 
 import numpy as np
+import pandas as pd
 
+from rrru.campaign.ingest.cells import Cell, Cells
 from rrru.campaign.ingest.formats import read_cells
 from rrru.campaign.ingest.guess import names_trajectories
 from rrru.campaign.ingest.problems import Problems
 from rrru.campaign.ingest.sheet import COMMAND, position_text, rows_text
+from rrru.campaign.ingest.spec import IngestSpec
 from rrru.campaign.measurements import vector_columns
+from rrru.kinematics.robot import Robot
 
 _ONE = "all"
 
 # with more rows without a pose something is wrong with all of them
 _MOST_LOST = 0.1
+# names of the points of the measured file and of the commands
+_Keys: TypeAlias = tuple[list[str], list[str]]
+
 # the same end effector's position within rounding
 _SAME_MM = 1e-6
 
 
-def with_commands(spec, measured, problems):
+def with_commands(spec: IngestSpec, measured: Cells, problems: Problems) -> Cells:
     """The Cells of a file with the columns of `spec.commands` in addition to its own.
 
     A file without names of trajectories is one trajectory. Raises IngestError where the files do not belong
@@ -35,7 +44,7 @@ def with_commands(spec, measured, problems):
         problems_of_commands = Problems(spec.commands)
         commanded = read_cells(Path(spec.commands), spec.commands_format, problems_of_commands)
         problems_of_commands.refuse()
-        measured = _joined(spec, measured, commanded, problems)
+        measured = _joined(spec, spec.commands, measured, commanded, problems)
     name = spec.columns.get("trajectory", measured.means.get("trajectory", "trajectory"))
     absent = name not in measured.names and "trajectory" not in spec.columns
     if absent and (measured.means or not names_trajectories(measured.names)):
@@ -45,18 +54,21 @@ def with_commands(spec, measured, problems):
     return measured
 
 
-def _joined(spec, measured, commanded, problems):
-    """Cells of both, a row per measured one; the commands' names of trajectories count before those of a list."""
+def _joined(spec: IngestSpec, file: str, measured: Cells, commanded: Cells, problems: Problems) -> Cells:
+    """Cells of both, a row per measured one, with the commands of a file.
+
+    The commands' names of trajectories count before those of a list.
+    """
     keys, added = _keys(spec, measured, commanded)
     for name in added:
         if name in measured.names:
-            value = f"a column of this name here and in {spec.commands}"
+            value = f"a column of this name here and in {file}"
             problems.add("repeated column", column=name, value=value, allowed="each name in one of the files")
     problems.refuse()
-    at, note = _places(spec.commands, keys, measured, commanded, problems)
+    at, note = _places(file, keys, measured, commanded, problems)
     problems.refuse()
     rows = {row: commanded.rows[i] for row, i in zip(measured.rows, at, strict=True)}
-    problems.elsewhere(spec.commands, added, rows)
+    problems.elsewhere(file, added, rows)
     group = measured.means.get("trajectory") if _column(spec, commanded, "trajectory") else None
     means = {ours: theirs for ours, theirs in measured.means.items() if theirs != group}
     return replace(
@@ -72,31 +84,40 @@ def _joined(spec, measured, commanded, problems):
     )
 
 
-def _column(spec, cells, ours):
+def _column(spec: IngestSpec, cells: Cells, ours: str) -> str | None:
     """The file's name of a column of ours, None where it has none."""
     declared = (name for name in (spec.columns.get(ours), ours) if name in cells.cells)
     return next(declared, cells.means.get(ours))
 
 
-def _keys(spec, measured, commanded):
+def _keys(spec: IngestSpec, measured: Cells, commanded: Cells) -> tuple[_Keys | None, list[str]]:
     """Names of the points of both files, None where one has none, and the commands' columns that are added."""
-    columns = [_column(spec, cells, "name") for cells in (measured, commanded)]
-    added = [name for name in commanded.names if name != columns[1]]
-    if None in columns:
-        return None, added
     files = (measured, commanded)
-    names = [[str(name).strip() for name in cells.cells[column]] for cells, column in zip(files, columns, strict=True)]
-    groups = [_column(spec, cells, "trajectory") for cells in files]
-    if len(set(names[1])) < len(names[1]) and None not in groups:
-        paths = (cells.cells[column] for cells, column in zip(files, groups, strict=True))
-        names = [
-            [f"{str(path).strip()} {name}" for path, name in zip(each, own_names, strict=True)]
-            for each, own_names in zip(paths, names, strict=True)
-        ]
-    return names, added
+    column, of_commands = (_column(spec, cells, "name") for cells in files)
+    added = [name for name in commanded.names if name != of_commands]
+    if column is None or of_commands is None:
+        return None, added
+    names, known = _texts(measured.cells[column]), _texts(commanded.cells[of_commands])
+    path, path_of_commands = (_column(spec, cells, "trajectory") for cells in files)
+    if len(set(known)) < len(known) and path is not None and path_of_commands is not None:
+        names = _below(measured.cells[path], names)
+        known = _below(commanded.cells[path_of_commands], known)
+    return (names, known), added
 
 
-def _places(file, keys, measured, commanded, problems):
+def _texts(cells: Sequence[Cell]) -> list[str]:
+    """Cells as names."""
+    return [str(cell).strip() for cell in cells]
+
+
+def _below(paths: Sequence[Cell], names: list[str]) -> list[str]:
+    """Names of points behind those of their trajectories."""
+    return [f"{path} {name}" for path, name in zip(_texts(paths), names, strict=True)]
+
+
+def _places(
+    file: str, keys: _Keys | None, measured: Cells, commanded: Cells, problems: Problems
+) -> tuple[Sequence[int], str]:
     """Place of each measured row's command among the commanded ones, and what was done to find it."""
     rows = len(measured.rows)
     if keys is None:
@@ -120,7 +141,7 @@ def _places(file, keys, measured, commanded, problems):
     return [place.get(name, 0) for name in names], f"commands of {file} joined by the points' names{more}"
 
 
-def with_sent(frame, mechanism, problems):
+def with_sent(frame: pd.DataFrame, mechanism: Robot, problems: Problems) -> tuple[pd.DataFrame, list[str]]:
     """The frame with the nominal robot's positions at its drive values as commanded ones, and notes on them.
 
     frame: columns of the file under our names, in mm and rad. A few rows at whose values the nominal robot has no pose
@@ -148,7 +169,7 @@ def with_sent(frame, mechanism, problems):
     return frame, notes
 
 
-def check_end_effectors(frame, mechanism, problems):
+def check_end_effectors(frame: pd.DataFrame, mechanism: Robot, problems: Problems) -> None:
     """Refuse rows that do not name a target on one of the end effectors, for a robot with several.
 
     A pose belongs to the end effector nearest to the commanded position, so that this has to be the named one's.

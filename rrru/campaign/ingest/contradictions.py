@@ -60,7 +60,8 @@ def find_contradiction(
     if not {*robot.parts.columns, *COMMAND} <= set(frame):
         return None
     # the commanded point is the tool of the end effector, whichever target it carries
-    tools = {name: tuple(robot.tool_mm) for hand in robot.legs.hands for name in hand}
+    x, y, z = robot.tool_mm
+    tools = {name: (x, y, z) for hand in robot.legs.hands for name in hand}
     unused = [*TARGET, *TURNS["measured"], *(() if tools else ("target",))]
     sent = frame.drop(columns=unused, errors="ignore").assign(**rows.vector_columns("measured", rows.command(frame)))
     file = GrossFile.of(sent, replace(spec, targets=tools, world_targets=()), robot, found, False)
@@ -101,7 +102,7 @@ class _Comparison:
         for k, unit in enumerate(file.robot.parts.units):
             stated = RAD[file.spec.angle_unit] if unit == "rad" else MM[file.spec.unit_of_drives]
             digit = stated * resolution(file.drive[:, [k]] / stated)
-            moved = self._nominal_at(0.5 * digit * np.eye(file.count)[k]) - self._nominal_at(np.zeros(file.count))
+            moved = self.file.tools(0.5 * digit * np.eye(file.count)[k]) - self.file.tools(np.zeros(file.count))
             result += float(np.nanmedian(np.linalg.norm(moved, axis=1)))
         return result
 
@@ -162,20 +163,16 @@ class _Comparison:
             yield f"commanded positions in the robot's frame: {by} brings them there"
         yield from self._zeros(np.ones(file.count, dtype=bool))
 
-    def _nominal_at(self, zeros: np.ndarray) -> np.ndarray:
-        """Points (n, 3) of the tool with zeros (K,) added to the drive values, NaN where there are none."""
-        return self.file.tools(zeros)
-
     def _zeros(self, which: np.ndarray) -> Iterator[str]:
         """Words for zeros of the drives of which (K,) that make both agree, by Gauss and Newton."""
         file, command = self.file, self.file.measured_mm[self.file.chosen]
         step = np.array([_STEP[unit] for unit in file.robot.parts.units])
         zeros = np.zeros(file.count)
         for _ in range(_MOST_STEPS):
-            here = self._nominal_at(zeros)
+            here = self.file.tools(zeros)
             slope = np.stack(
                 [
-                    (self._nominal_at(zeros + s * e) - here) / s
+                    (self.file.tools(zeros + s * e) - here) / s
                     for s, e in zip(step[which], np.eye(file.count)[which], strict=True)
                 ],
                 axis=-1,
@@ -188,7 +185,7 @@ class _Comparison:
             zeros[which] += change
             if np.abs(change / step[which]).max() < 1.0:
                 break
-        if self.agree(np.nan_to_num(np.linalg.norm(command - self._nominal_at(zeros), axis=1), nan=np.inf)):
+        if self.agree(np.nan_to_num(np.linalg.norm(command - self.file.tools(zeros), axis=1), nan=np.inf)):
             units, names = file.robot.parts.units, file.robot.parts.columns
             parts = [f"{zeros[k]:.6g} {units[k]} to {names[k]}" for k in np.flatnonzero(np.abs(zeros) > step)]
             yield f"drive values whose zeros are the robot's: adding {', '.join(parts)} makes both agree"
@@ -196,7 +193,7 @@ class _Comparison:
 
 def _points(nominal: TargetReadings) -> np.ndarray:
     """Points (n, 3) of the tool."""
-    return nominal.body_mm + np.einsum("nij,j->ni", nominal.body_turn, nominal.place_mm[0])
+    return np.asarray(nominal.body_mm + np.einsum("nij,j->ni", nominal.body_turn, nominal.place_mm[0]))
 
 
 def _off(nominal: TargetReadings | None) -> np.ndarray:

@@ -1,8 +1,7 @@
 """The formats of measurement files: which one a file has, and its cells read in it."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Any, Self
 
@@ -12,7 +11,7 @@ from rrru.campaign.ingest.trackers import leica_cells, spatial_analyzer_cells
 from rrru.errors import ConfigError
 
 # reader of a file's bytes by kind, and keys that the kind knows
-_READERS = {
+_READERS: dict[str, tuple[Callable[..., Cells], tuple[str, ...]]] = {
     "csv": (text_cells, ("separator", "decimal")),
     "leica": (leica_cells, ("separator", "decimal")),
     "spatial_analyzer": (spatial_analyzer_cells, ("separator", "decimal")),
@@ -72,4 +71,4 @@ def read_cells(path: Path, how: Format, problems: Problems) -> Cells:
     data = read_bytes(path, problems)
     kind = how.kind_of(path, problems)
     reader, keys = _READERS[kind]
-    return partial(reader, **{key: getattr(how, key) for key in keys})(data, problems)
+    return reader(data, problems, **{key: getattr(how, key) for key in keys})

@@ -16,7 +16,9 @@ import numpy as np
 
 from rrru.campaign.ingest.registration import register
 from rrru.campaign.ingest.zero_offsets import Framed
+from rrru.campaign.target_registration import nearest_rotation
 from rrru.errors import FitError
+from rrru.kinematics.chain import Poses
 
 _TURNS, _STILL_MM = 300, 1e-9
 
@@ -37,27 +39,27 @@ class Frames:
     right: np.ndarray
     registered: bool
 
-    def select(self, rows):
+    def select(self, rows: np.ndarray) -> "Frames":
         """The readings of some rows."""
         parts = {f.name: getattr(self, f.name) for f in fields(self)}
         return Frames(**{name: part[rows] if isinstance(part, np.ndarray) else part for name, part in parts.items()})
 
     @property
-    def known(self):
+    def known(self) -> np.ndarray:
         """Rows (n,) whose places are known."""
-        return np.isfinite(self.place_mm).all(axis=1)
+        return np.asarray(np.isfinite(self.place_mm).all(axis=1))
 
     @property
-    def framing(self):
+    def framing(self) -> np.ndarray:
         """Rows (n,) that determine the instrument's frame."""
-        return self.right & (self.known | ~self.on_world)
+        return np.asarray(self.right & (self.known | ~self.on_world))
 
-    def carriers(self, poses):
+    def carriers(self, poses: Poses) -> Poses:
         """Poses (n) of what carries each reflector."""
         centre = np.where(self.on_world[:, None], 0.0, poses.position_mm)
         return replace(poses, position_mm=centre, turn=np.where(self.on_world[:, None, None], np.eye(3), poses.turn))
 
-    def fitted(self, poses):
+    def fitted(self, poses: Poses) -> tuple[np.ndarray, np.ndarray]:
         """Rotation (3, 3) of the instrument's frame, and all places (n, 3), from Poses (n)."""
         carriers = self.carriers(poses)
         if not self.registered:
@@ -77,7 +79,7 @@ class Frames:
                 break
         return rotation, place
 
-    def framed(self, poses, fitted=None):
+    def framed(self, poses: Poses, fitted: tuple[np.ndarray, np.ndarray] | None = None) -> Framed:
         """The Framed of Poses (n), of the rows that determine something; fitted: what `fitted` gives of them."""
         rotation, place = fitted or self.fitted(poses)
         model, turned, rows = self.carriers(poses).point(place), self.seen_mm @ rotation.T, self.framing
@@ -85,7 +87,7 @@ class Frames:
         unknown = tuple(dict.fromkeys(self.names[~self.known & rows].tolist()))
         return Framed((turned + shift)[rows], model[rows], place[rows], unknown)
 
-    def _placed(self, carriers, seen_mm):
+    def _placed(self, carriers: Poses, seen_mm: np.ndarray) -> np.ndarray:
         """Places (n, 3): the known ones, and medians of the readings on the carrier for the others."""
         result, known = self.place_mm.copy(), self.known
         on_carrier = np.einsum("nji,nj->ni", carriers.turn, seen_mm - carriers.position_mm)
@@ -95,7 +97,7 @@ class Frames:
             result[its] = np.median(on_carrier[used], axis=0)
         return result
 
-    def _linear(self, carriers):
+    def _linear(self, carriers: Poses) -> tuple[np.ndarray, np.ndarray]:
         """Start of `fitted`: least squares of the linear equations, whose matrix is projected to a rotation."""
         rows = self.framing
         carriers, seen, names, place = carriers.of(rows), self.seen_mm[rows], self.names[rows], self.place_mm[rows]
@@ -110,8 +112,7 @@ class Frames:
         aim = np.where(known[:, None], carriers.point(np.nan_to_num(place)), carriers.position_mm)
         scale = np.abs(columns).max(axis=(0, 1)) + 1e-12
         numbers = np.linalg.lstsq((columns / scale).reshape(3 * count, -1), aim.ravel(), rcond=1e-6)[0] / scale
-        u, _, vt = np.linalg.svd(numbers[:9].reshape(3, 3))
-        rotation = u @ np.diag([1.0, 1.0, np.linalg.det(u @ vt)]) @ vt
+        rotation = nearest_rotation(numbers[:9].reshape(3, 3))
         place = np.where(known[:, None], place, 0.0)
         for k, name in enumerate(unknown):
             place[names == name] = numbers[12 + 3 * k : 15 + 3 * k]

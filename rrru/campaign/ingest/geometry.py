@@ -1,12 +1,15 @@
 """Consistency of commanded, drive and measured values with the robot and with each other. Lengths in mm."""
 
+from collections.abc import Callable
 from itertools import permutations, product
 
 import numpy as np
+import pandas as pd
 
 from rrru.campaign import measurements as rows
-from rrru.campaign.ingest.sheet import AXES, COMMAND, MEASURED, TURNS, position_text
+from rrru.campaign.ingest.sheet import AXES, COMMAND, MEASURED, TURNS, Sheet, position_text
 from rrru.campaign.ingest.spec import MM
+from rrru.kinematics.robot import Robot
 
 # Files print drive angles with six decimals and positions with three or more, sometimes two.
 DRIVE_TOLERANCE = {"rad": 1e-4, "mm": 0.01}
@@ -20,14 +23,15 @@ _REACH_MARGIN = 1.1
 _MOST, _MANY = 0.9, 0.5
 
 
-def check_commands(sheet):
+def check_commands(sheet: Sheet) -> bool:
     """Note commanded positions out of reach and drive values that contradict them; True where the unit can be right."""
     known = sheet.frame.dropna(subset=[*COMMAND])
     command = rows.command(known)
     if not len(known):
         return True
     if sheet.mechanism.orients and set(sheet.drives) <= set(known):
-        return _check_poses(known, command, sheet)
+        _check_poses(known, command, sheet)
+        return True
     if _wrong_unit(command, sheet):
         return False
     drive = sheet.needed(known, command)
@@ -42,8 +46,8 @@ def check_commands(sheet):
     return True
 
 
-def _check_poses(known, command, sheet):
-    """Note drive values that bring the nominal robot elsewhere than commanded; True.
+def _check_poses(known: pd.DataFrame, command: np.ndarray, sheet: Sheet) -> None:
+    """Note drive values that bring the nominal robot elsewhere than commanded.
 
     For a robot that can orient its platform the commanded positions alone do not determine the drive values.
     """
@@ -61,10 +65,9 @@ def _check_poses(known, command, sheet):
     elif len(off) and (median := np.median(off[posed])) > limit:
         value = f"{sheet.drive_name} that bring the nominal robot {median:.6g} mm from there in the median"
         sheet.note("angles", COMMAND, value, f"at most {limit:.4g} mm; {advice}")
-    return True
 
 
-def check_sizes(sheet, offset_mm=0.0):
+def check_sizes(sheet: Sheet, offset_mm: np.ndarray | float = 0.0) -> bool:
     """Note measured positions in another unit than the commanded ones; True where both have the same unit.
 
     Their spreads are compared, which are the same in every frame. offset_mm (n, 3): of what is measured from the tool.
@@ -97,14 +100,14 @@ def check_sizes(sheet, offset_mm=0.0):
     return False
 
 
-def _place_stated(sheet):
+def _place_stated(sheet: Sheet) -> bool:
     """Whether the place of every reflector is stated, or moves as the tool does."""
     if not sheet.mechanism.orients or "target" not in sheet.frame:
         return True
     return set(sheet.frame["target"].astype(str)) <= set(dict(sheet.spec.targets))
 
 
-def check_measured(sheet, frame_advice):
+def check_measured(sheet: Sheet, frame_advice: Callable[[], str]) -> None:
     """Note measured positions, in the robot's frame, beyond its reach or far from all commanded ones.
 
     frame_advice: function without arguments that returns the advice, in words, where all are far off.
@@ -132,7 +135,7 @@ def check_measured(sheet, frame_advice):
         sheet.note("reach of measured", MEASURED, position_text(measured[i]), allowed, known.index[i])
 
 
-def plausibility_notes(frame, mechanism, places_instead):
+def plausibility_notes(frame: pd.DataFrame, mechanism: Robot, places_instead: Callable[[float], str]) -> list[str]:
     """Notes on implausible measured positions in the robot's frame: all of them far off, or one row late or early.
 
     places_instead: function from the distance in mm that may remain to places of targets or tool, in words.
@@ -152,8 +155,10 @@ def plausibility_notes(frame, mechanism, places_instead):
     return notes
 
 
-def beyond_ranges(actuators, mechanism):
+def beyond_ranges(actuators: np.ndarray, mechanism: Robot) -> list[str]:
     """Notes on the drives whose actuator values (n, K) are outside of their stated ranges at some points."""
+    if mechanism.drive_range is None:
+        return []
     outside, notes = np.isnan(mechanism.in_range(actuators)) & np.isfinite(actuators), []
     for k in np.flatnonzero(outside.any(axis=0)):
         (low, high), unit, drive = mechanism.drive_range[k], mechanism.parts.units[k], mechanism.parts.columns[k]
@@ -162,21 +167,21 @@ def beyond_ranges(actuators, mechanism):
     return notes
 
 
-def frame_limit(mechanism):
+def frame_limit(mechanism: Robot) -> float:
     """Distance in mm between measured and commanded positions above which the frames must differ."""
     return _FRAME_SHARE * mechanism.size_mm
 
 
-def _spread(position):
+def _spread(position: np.ndarray) -> float:
     """Median distance of positions (n, 3) from their median."""
     return float(np.median(np.linalg.norm(position - np.median(position, axis=0), axis=1)))
 
 
-def _wrong_unit(command, sheet):
+def _wrong_unit(command: np.ndarray, sheet: Sheet) -> bool:
     """Note that another unit brings the commanded positions into reach; True where that is so."""
 
-    def reached(position):
-        return np.isfinite(sheet.mechanism.inverse(position, elbow=sheet.spec.elbow)).all(axis=1).mean()
+    def reached(position: np.ndarray) -> float:
+        return float(np.isfinite(sheet.mechanism.inverse(position, elbow=sheet.spec.elbow)).all(axis=1).mean())
 
     read = sheet.spec.unit
     if reached(command) >= _MANY:
@@ -191,7 +196,7 @@ def _wrong_unit(command, sheet):
     return False
 
 
-def _upside_down(command, drive, sheet):
+def _upside_down(command: np.ndarray, drive: np.ndarray, sheet: Sheet) -> bool:
     """Note that the robot is on the other side of its base; True where that is so."""
     back = sheet.mechanism.forward(drive)
     flipped = np.abs(back[:, 2] + command[:, 2]) < np.abs(back[:, 2] - command[:, 2])
@@ -204,7 +209,7 @@ def _upside_down(command, drive, sheet):
     return True
 
 
-def _check_drives(known, drive, sheet):
+def _check_drives(known: pd.DataFrame, drive: np.ndarray, sheet: Sheet) -> None:
     """Note drive angles or slider positions that are not those (n, 3) of the commanded positions."""
     units = sheet.mechanism.parts.units
     given, command = known[[*sheet.drives]].to_numpy(), rows.command(known)
@@ -222,12 +227,12 @@ def _check_drives(known, drive, sheet):
         sheet.note("angles", sheet.drives[k], f"{given[i, k]:.6f} {units[k]}, {needs}", allowed, known.index[i])
 
 
-def _tolerances(mechanism):
+def _tolerances(mechanism: Robot) -> np.ndarray:
     """Largest differences (K,) of actuator values in their units."""
     return np.array([DRIVE_TOLERANCE[unit] for unit in mechanism.parts.units])
 
 
-def _elbow_advice(given, command, sheet):
+def _elbow_advice(given: np.ndarray, command: np.ndarray, sheet: Sheet) -> str | None:
     """Advice, in words, where the drive values fit the commanded positions with the other elbow, or None."""
     elbow = {"out": "in", "in": "out"}[sheet.spec.elbow]
     off = np.abs(given - sheet.mechanism.inverse(command, elbow=elbow))
@@ -235,7 +240,7 @@ def _elbow_advice(given, command, sheet):
     return f"elbow: {elbow} makes them fit" if fits else None
 
 
-def _axes_advice(measured, command, limit):
+def _axes_advice(measured: np.ndarray, command: np.ndarray, limit: float) -> str | None:
     """Exchange or reversal of the file's axes that makes measured positions fit, or None."""
     best, text = limit, None
     for order, signs in product(permutations(range(3)), product((1.0, -1.0), repeat=3)):

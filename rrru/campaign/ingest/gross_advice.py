@@ -101,7 +101,7 @@ def _of_axes(file: GrossFile, rotation: np.ndarray) -> str:
     along = np.where(np.abs(rotation) > _ALONG_AN_AXIS, np.sign(rotation), 0.0)
     turned = np.flatnonzero(np.diag(along) < 0.0)
     if np.abs(along).sum() == 3.0 and (along >= 0.0).all():
-        first, second = np.flatnonzero(np.diag(along) == 0.0)
+        first, second = np.flatnonzero(np.diag(along) == 0.0).tolist()
     elif np.abs(np.diag(along)).sum() == 3.0 and len(turned) == 1:
         return f"turn the sign of {file.found.get(MEASURED[turned[0]], MEASURED[turned[0]])}"
     else:

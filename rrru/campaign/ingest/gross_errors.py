@@ -12,7 +12,7 @@ evidence: that of a registration with any matrix in place of the rotation. A fil
 zero offsets of the drives, is not of this robot. Lengths in mm, angles in rad.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -133,23 +133,23 @@ class _Search:
         """The most probable one so far."""
         return max(self.found.values(), key=lambda one: one.log_evidence)
 
-    def look_at(self, every) -> None:
+    def look_at(self, every: Iterable[Mistakes]) -> None:
         """Evaluate the most promising of some Mistakes."""
         fresh = [
             one for one in dict.fromkeys(every) if one not in self.found and one not in self._at_most and one.count
         ]
         self._at_most |= {one: self._file.evidence_at_most(one) for one in fresh}
         promising = sorted(fresh, key=self._at_most.__getitem__, reverse=True)[:_MOST_LOOKED_AT]
-        for number, one in enumerate(promising):
-            if number >= _FIRST_LOOKED_AT and self._at_most[one] < self.best.log_evidence - _FAR_BEHIND:
-                break
-            self.found[one] = self._file.hypothesis(one)
-            del self._at_most[one]
+        self._evaluate(promising, _FIRST_LOOKED_AT)
 
     def settle(self) -> None:
         """Evaluate all hypotheses that may be as good as the best one, up to a limit."""
-        for one in sorted(self._at_most, key=self._at_most.__getitem__, reverse=True)[:_MOST_SETTLED]:
-            if self._at_most[one] < self.best.log_evidence - _FAR_BEHIND:
+        self._evaluate(sorted(self._at_most, key=self._at_most.__getitem__, reverse=True)[:_MOST_SETTLED])
+
+    def _evaluate(self, promising: list[Mistakes], least: int = 0) -> None:
+        """Evaluate Mistakes in their order, at least so many, until one is far behind the best one."""
+        for number, one in enumerate(promising):
+            if number >= least and self._at_most[one] < self.best.log_evidence - _FAR_BEHIND:
                 break
             self.found[one] = self._file.hypothesis(one)
             del self._at_most[one]

@@ -107,20 +107,22 @@ class GrossFile:
         drive = frame[[*robot.parts.columns]].to_numpy(dtype=float) if driven else np.zeros((len(frame), 0))
         command = rows.command(frame) if commanded else None
         right = np.isfinite(drive).all(axis=1) & np.isfinite(rows.measured(frame)).all(axis=1)
-        right &= ~np.isin(names, spec.world_targets) & (driven or np.isfinite(command).all(axis=1))
+        right &= ~np.isin(names, spec.world_targets)
+        if command is not None and not driven:
+            right &= np.isfinite(command).all(axis=1)
         chosen = _some(np.flatnonzero(right), _MOST_ROWS)
         turn = rows.turns(frame, "command") if set(TURNS["command"]) <= set(frame) else None
         turn = np.broadcast_to(robot.legs.home_turn, (len(frame), 3, 3)) if turn is None else turn
         place = _places(frame, spec, robot, known, number)
         read = rows.measured(frame), _labels(frame), number, tuple(known.tolist()), place
-        if not driven and not _moves(command[chosen], robot):
+        if command is not None and not driven and not _moves(command[chosen], robot):
             return None
         return cls(robot, spec, found, unit_stated, drive, command, turn, *read, chosen)
 
     @property
     def count(self) -> int:
         """Number of drives with values in the file."""
-        return self.drive.shape[1]
+        return int(self.drive.shape[1])
 
     @property
     def given(self) -> Mistakes:
@@ -184,7 +186,7 @@ class GrossFile:
             return place_mm
         axes, turned = axes_by_turning(turn)
         still = axes[:, turned == 0.0]
-        return place_mm + still @ still.T @ np.median((self.place_mm - place_mm)[self._stated], axis=0)
+        return np.asarray(place_mm + still @ still.T @ np.median((self.place_mm - place_mm)[self._stated], axis=0))
 
     def with_zeros(self) -> Hypothesis:
         """The Hypothesis of no mistake, with the lost zero offsets of the drives that explain most."""
@@ -206,7 +208,7 @@ class GrossFile:
     @property
     def _stated(self) -> np.ndarray:
         """Targets (k,) with stated places."""
-        return np.isfinite(self.place_mm).all(axis=1)
+        return np.asarray(np.isfinite(self.place_mm).all(axis=1))
 
     @cached_property
     def _ways(self) -> int:
@@ -235,7 +237,7 @@ class GrossFile:
         if len(at) < 3:
             return None
         body, turn = self._bodies(mistakes, at)
-        if self.agreed and not mistakes.of_readings:
+        if self.agreed and self.command_mm is not None and not mistakes.of_readings:
             off = np.linalg.norm(body + turn @ np.asarray(self.robot.tool_mm) - self.command_mm[at], axis=1)
             if not np.median(off) <= _AGREED_MM:
                 return None
@@ -264,11 +266,11 @@ class GrossFile:
     def tools(self, zeros: np.ndarray) -> np.ndarray:
         """Nominal positions (m, 3) of the tool in the rows that decide, with zeros (K,) added to the drive values."""
         body, turn = replace(self, drive=self.drive + zeros)._bodies(self.given, self.chosen)
-        return body + turn @ np.asarray(self.robot.tool_mm, dtype=float)
+        return np.asarray(body + turn @ np.asarray(self.robot.tool_mm, dtype=float))
 
     def _bodies(self, mistakes: Mistakes, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Positions (m, 3), NaN where there are none, and turns (m, 3, 3) of what carries the targets of some rows."""
-        if not self.count:
+        if self.command_mm is not None and not self.count:
             turn = self.command_turn[at]
             return self.command_mm[at] - turn @ np.asarray(self.robot.tool_mm, dtype=float), turn
         lengths = np.array(self.robot.parts.units) == "mm"
@@ -299,7 +301,9 @@ class GrossFile:
 
     def _guess(self, values: np.ndarray, at: np.ndarray) -> np.ndarray:
         """Positions (m, 3) near which the poses of drive values (m, K) of some rows are."""
-        return self.robot.guess(values, np.array(self.names)[self.target[at]] if self.robot.legs.hands else None)
+        return np.asarray(
+            self.robot.guess(values, np.array(self.names)[self.target[at]] if self.robot.legs.hands else None)
+        )
 
     def _rows(self, shift: int) -> np.ndarray:
         """Rows (m,) whose measured values, so many rows on, are of the same run and target."""
@@ -308,7 +312,7 @@ class GrossFile:
         there = self.chosen + shift
         at = self.chosen[(there >= 0) & (there < len(self.run))]
         same = (self.run[at] == self.run[at + shift]) & (self.target[at] == self.target[at + shift])
-        return at[same & np.isfinite(self.measured_mm[at + shift]).all(axis=1)]
+        return np.asarray(at[same & np.isfinite(self.measured_mm[at + shift]).all(axis=1)])
 
 
 def _closed(poses: Poses) -> tuple[np.ndarray, np.ndarray]:
@@ -335,7 +339,9 @@ def _places(frame: pd.DataFrame, spec: IngestSpec, robot: Robot, names: np.ndarr
     unnamed = {} if set(TURNS["measured"]) <= set(frame) else {"": tool}
     stated = dict(spec.targets) if "target" in frame else unnamed
     if set(TARGET) <= set(frame):
-        return frame[[*TARGET]].to_numpy(dtype=float)[[int(np.argmax(number == k)) for k in range(len(names))]]
+        return np.asarray(
+            frame[[*TARGET]].to_numpy(dtype=float)[[int(np.argmax(number == k)) for k in range(len(names))]]
+        )
     return np.array([stated.get(name, (np.nan,) * 3) for name in names.tolist()], dtype=float)
 
 
@@ -344,7 +350,7 @@ def _labels(frame: pd.DataFrame) -> np.ndarray:
     run = frame["run"].to_numpy(dtype=float) if "run" in frame else np.zeros(len(frame))
     path = frame["trajectory"] if "trajectory" in frame else np.full(len(frame), "")
     pairs = pd.DataFrame({"run": np.nan_to_num(run), "trajectory": np.asarray(path)})
-    return pairs.groupby(["run", "trajectory"], sort=False).ngroup().to_numpy()
+    return np.asarray(pairs.groupby(["run", "trajectory"], sort=False).ngroup().to_numpy())
 
 
 def _factor(units: Mapping[str, float], right: str | None, stated: str) -> float:

@@ -52,12 +52,8 @@ class Mistakes:
     @property
     def of_readings(self) -> bool:
         """Whether the readings are wrong and none of the drive values."""
-        return self == replace(Mistakes.none(len(self.signs)), **self._of_readings)
-
-    @property
-    def _of_readings(self) -> dict:
-        names = ("shift", "free", "mirrored", "unit")
-        return {name: value for name, value in vars(self).items() if name in names}
+        right = Mistakes.none(len(self.signs))
+        return self == replace(self, signs=right.signs, order=right.order, drive_unit=None, angle_unit=None)
 
     @property
     def _reordered(self) -> bool:
@@ -94,7 +90,12 @@ class Mistakes:
         yield replace(self, free=True)
         yield replace(self, mirrored=True)
         for one in units:
-            yield replace(self, **one)
+            yield replace(
+                self,
+                unit=one.get("unit", self.unit),
+                drive_unit=one.get("drive_unit", self.drive_unit),
+                angle_unit=one.get("angle_unit", self.angle_unit),
+            )
 
     def reordered(self, order: tuple[int, ...]) -> "Mistakes":
         """These mistakes with the columns in another order (K,) before."""

@@ -3,9 +3,11 @@
 The poses are the robot's nominal ones, or those with the lost zero offsets of its drives. Lengths in mm, angles in rad.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+import pandas as pd
 from scipy.spatial.transform import Rotation
 
 from rrru.campaign import measurements as rows
@@ -14,9 +16,10 @@ from rrru.campaign.ingest.frames import Frames
 from rrru.campaign.ingest.gross_advice import place_words
 from rrru.campaign.ingest.orientations import other_readings
 from rrru.campaign.ingest.outliers import strays
-from rrru.campaign.ingest.sheet import MEASURED, TURNS, position_text
+from rrru.campaign.ingest.sheet import MEASURED, TURNS, Sheet, position_text
 from rrru.campaign.ingest.zero_offsets import LARGE, LOST, found_zeros
 from rrru.campaign.target_registration import axes_by_turning
+from rrru.kinematics.chain import Poses
 from rrru.kinematics.readings import Readings
 
 # the name of a reflector where the file has no such column
@@ -58,14 +61,14 @@ class Mounting:
     turn: np.ndarray
     strays: np.ndarray
     zeros_lost: bool
-    notes: tuple
+    notes: tuple[str, ...]
 
     @property
-    def framing(self):
+    def framing(self) -> np.ndarray:
         """Rows (n,) that determine the instrument's frame."""
-        return ~self.strays & ~self.on_world
+        return np.asarray(~self.strays & ~self.on_world)
 
-    def columns(self, frame, rotation):
+    def columns(self, frame: pd.DataFrame, rotation: np.ndarray) -> dict[str, np.ndarray]:
         """Columns of a measurement table; rotation (3, 3): of the instrument's frame into the robot's."""
         if self.names is None:
             return {}
@@ -78,7 +81,7 @@ class Mounting:
         return result
 
 
-def mounting(sheet):
+def mounting(sheet: Sheet) -> Mounting | None:
     """The Mounting of a sheet without problems, None where the tool itself is read and no zero offset is lost."""
     frame, registered = sheet.frame, sheet.spec.frame == "register"
     turned, driven = set(TURNS["measured"]) <= set(frame), set(sheet.drives) <= set(frame)
@@ -123,11 +126,12 @@ def mounting(sheet):
     )
 
 
-def _frames(sheet, named):
+def _frames(sheet: Sheet, named: bool) -> tuple[Frames, tuple[str, ...]]:
     """The Frames of a sheet, and notes on readings that are none of their reflector."""
     frame, seen = sheet.frame, rows.measured(sheet.frame)
     names = frame["target"].to_numpy() if "target" in frame else np.full(len(frame), _UNNAMED)
-    on_world, right, notes = np.isin(names, sheet.spec.world_targets), np.ones(len(frame), dtype=bool), ()
+    on_world, right = np.isin(names, sheet.spec.world_targets), np.ones(len(frame), dtype=bool)
+    notes: tuple[str, ...] = ()
     if "target" in frame:
         wrong, texts = strays(seen, stops(frame), names, on_world)
         right = ~wrong
@@ -138,7 +142,7 @@ def _frames(sheet, named):
     return Frames(seen, names, stated, on_world, right, sheet.spec.frame == "register"), notes
 
 
-def _zeros(sheet, frames, command):
+def _zeros(sheet: Sheet, frames: Frames, command: np.ndarray) -> tuple[np.ndarray, bool]:
     """Zero offsets (K,) of the drives and whether they are lost, see `rrru.campaign.ingest.zero_offsets`."""
     chosen = np.flatnonzero(frames.framing)
     if len(chosen) > _MAX_ROWS:
@@ -148,7 +152,7 @@ def _zeros(sheet, frames, command):
     return found_zeros(sheet.mechanism, (sheet.actuators(command)[chosen], command[chosen]), seen, framed)
 
 
-def _refuse_places(sheet, left_mm, lost):
+def _refuse_places(sheet: Sheet, left_mm: float, lost: bool) -> None:
     """Raise IngestError where other places leave far less than the left_mm of zeros of the drives.
 
     lost: whether these are lost; smaller ones are refused only where the other places are far from the stated ones.
@@ -161,7 +165,7 @@ def _refuse_places(sheet, left_mm, lost):
     sheet.refuse_now(MEASURED, value, f"{allowed}frame: register may do so, too")
 
 
-def _moved_mm(sheet, places):
+def _moved_mm(sheet: Sheet, places: Mapping[str, np.ndarray]) -> float:
     """Largest distance in mm of places by name from the stated ones, infinite where one is not stated."""
     stated = {"": sheet.mechanism.tool_mm, **sheet.spec.targets}
     if not set(places) <= set(stated):
@@ -169,7 +173,7 @@ def _moved_mm(sheet, places):
     return max(float(np.linalg.norm(place - np.asarray(stated[name]))) for name, place in places.items())
 
 
-def places_instead(sheet, most_mm):
+def places_instead(sheet: Sheet, most_mm: float) -> str:
     """The key `targets`, or the place of the tool, with which the nominal robot agrees with readings in its own frame.
 
     In words; empty where a median distance of more than most_mm remains.
@@ -178,7 +182,7 @@ def places_instead(sheet, most_mm):
     return place_words(places) if places else ""
 
 
-def _places(sheet, most_mm):
+def _places(sheet: Sheet, most_mm: float) -> dict[str, np.ndarray]:
     """Places (3,) by name of the targets, "" for the tool, as for `places_instead`; none where more remains."""
     frame, poses = sheet.frame, sheet.poses
     if sheet.spec.frame != "robot":
@@ -196,7 +200,7 @@ def _places(sheet, most_mm):
     return {name: found.place_mm[names == name][0] for name in dict.fromkeys(names.tolist())}
 
 
-def _in_words(sheet, zeros, left_mm):
+def _in_words(sheet: Sheet, zeros: np.ndarray, left_mm: float) -> tuple[str, ...]:
     """Notes on lost zeros (K,) of the drives, with which the nominal robot is left_mm off in the median."""
     parts = sheet.mechanism.parts
     shares = np.abs(zeros) / [LOST[unit] for unit in parts.units]
@@ -212,7 +216,7 @@ def _in_words(sheet, zeros, left_mm):
     return (f"{lost} lost, by {most} at {drive.site}: {found}; if the drives are referenced, {instead}",)
 
 
-def check_turned(sheet):
+def check_turned(sheet: Sheet) -> None:
     """Note orientations in another frame than the robot's, in a sheet that has some and no Mounting."""
     if not set(TURNS["measured"]) <= set(sheet.frame):
         return
@@ -223,7 +227,7 @@ def check_turned(sheet):
         _check_turned(sheet, _between(sheet.poses, turns, np.eye(3)))
 
 
-def _refuse_scattered(sheet, poses, rotation):
+def _refuse_scattered(sheet: Sheet, poses: Poses, rotation: np.ndarray) -> None:
     """Raise IngestError where orientations turn otherwise than the platform does, with what reconciles them if known.
 
     poses: the robot's; rotation (3, 3): from the instrument's frame to the robot's, by the positions.
@@ -238,7 +242,7 @@ def _refuse_scattered(sheet, poses, rotation):
         made = np.full(turns.shape, np.nan)
         made[known] = read
         others[what] = _scatter(poses, made, rotation)
-    best = min(others, key=others.get)
+    best = min(others, key=others.__getitem__)
     value = f"orientations that differ by {scatter:.3g} rad in the median from a fixed turn against the platform's"
     allowed = f"at most {_MOST_SCATTERED_RAD:g} rad"
     if others[best] < _FAR_LESS * scatter:
@@ -248,15 +252,13 @@ def _refuse_scattered(sheet, poses, rotation):
     sheet.refuse_now(TURNS["measured"], value, allowed)
 
 
-def _scatter(poses, turns, rotation):
+def _scatter(poses: Poses, turns: np.ndarray, rotation: np.ndarray) -> float:
     """Median angle between orientations (n, 3, 3) that are read and the platform's, after the best fixed turn."""
-    known = np.isfinite(turns).all(axis=(1, 2)) & poses.closed
-    off = poses.turn[known].transpose(0, 2, 1) @ rotation @ turns[known]
-    mean = Rotation.from_matrix(off).mean()
-    return float(np.median((Rotation.from_matrix(off) * mean.inv()).magnitude()))
+    off = _turned_off(poses, turns, rotation)
+    return float(np.median((off * off.mean().inv()).magnitude()))
 
 
-def _check_turned(sheet, turn):
+def _check_turned(sheet: Sheet, turn: np.ndarray) -> None:
     """Note that orientations are read as turned against the platform's by a rotation (3, 3)."""
     angle = Rotation.from_matrix(turn).magnitude()
     if angle > _MOST_TURNED_RAD:
@@ -265,7 +267,7 @@ def _check_turned(sheet, turn):
         sheet.note("frame", TURNS["measured"], value, allowed)
 
 
-def _known(sheet, names):
+def _known(sheet: Sheet, names: np.ndarray) -> np.ndarray:
     """Stated places (n, 3) of the reflectors, NaN where not stated; notes those that the file lacks."""
     stated = dict(sheet.spec.targets)
     for name in sorted(set(stated) - set(names)):
@@ -275,7 +277,9 @@ def _known(sheet, names):
     return np.array([stated.get(name, nowhere) for name in names], dtype=float)
 
 
-def _found(sheet, frames, place, precision):
+def _found(
+    sheet: Sheet, frames: Frames, place: np.ndarray, precision: tuple[np.ndarray, np.ndarray, list[np.ndarray]]
+) -> tuple[str, ...]:
     """Notes on the places (n, 3) that were found; precision: of `_precision`, and of `_by_zeros`."""
     (axes, errors, by_zeros), result = precision, []
     for name in dict.fromkeys(frames.names.tolist()):
@@ -295,7 +299,7 @@ def _found(sheet, frames, place, precision):
     return tuple(result)
 
 
-def _precision(frames, poses, residual):
+def _precision(frames: Frames, poses: Poses, residual: float) -> tuple[np.ndarray, np.ndarray]:
     """Axes (3, 3) of the platform, in columns, and the error (3,) that an estimated place may have along each of them.
 
     The nominal robot's own errors make the residual in mm and may move a place by as much, however many readings there
@@ -308,7 +312,7 @@ def _precision(frames, poses, residual):
         return axes, np.where(turned > 0.0, residual / turned, np.inf)
 
 
-def _by_zeros(sheet, poses, command):
+def _by_zeros(sheet: Sheet, poses: Poses, command: np.ndarray) -> list[np.ndarray]:
     """Matrices (3, 4) from places (x, y, z, 1) to what an ordinary zero offset moves them by, of drives that allow it.
 
     A zero offset of the last drive of a chain moves the platform alike in all poses. No reading tells it from the
@@ -329,7 +333,7 @@ def _by_zeros(sheet, poses, command):
     return result
 
 
-def _place_text(place, still, about):
+def _place_text(place: np.ndarray, still: np.ndarray, about: float) -> str:
     """A place (3,) on the platform in words, with a question mark for a number that the readings do not determine.
 
     still (k, 3): axes along which they do not; about: error in mm along the others.
@@ -346,8 +350,12 @@ def _place_text(place, still, about):
     return result
 
 
-def _between(poses, turns, rotation):
+def _between(poses: Poses, turns: np.ndarray, rotation: np.ndarray) -> np.ndarray:
     """The mean rotation (3, 3) from the platform to the orientations (n, 3, 3) that are read in a frame (3, 3)."""
-    known = np.isfinite(turns).all(axis=(1, 2))
-    off = poses.turn[known].transpose(0, 2, 1) @ rotation @ turns[known]
-    return Rotation.from_matrix(off).mean().as_matrix()
+    return np.asarray(_turned_off(poses, turns, rotation).mean().as_matrix())
+
+
+def _turned_off(poses: Poses, turns: np.ndarray, rotation: np.ndarray) -> Rotation:
+    """Rotations from the platform to the orientations (n, 3, 3) that are read in a frame (3, 3), at known poses."""
+    known = np.isfinite(turns).all(axis=(1, 2)) & poses.closed
+    return Rotation.from_matrix(poses.turn[known].transpose(0, 2, 1) @ rotation @ turns[known])

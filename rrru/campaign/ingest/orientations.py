@@ -1,14 +1,18 @@
 """Orientations in a file: rotation vectors, or quaternions that are turned into them. Angles in rad."""
 
-import numpy as np
+from collections.abc import Mapping, Sequence
 
+import numpy as np
+import pandas as pd
+
+from rrru.campaign.ingest.problems import Problems
 from rrru.campaign.ingest.sheet import QUATERNIONS, TURNS
 
 # a unit quaternion printed with three decimals; no rotation vector is longer than a turn
 _UNIT, _LONGEST_RAD = 2e-3, 2.0 * np.pi + 1e-6
 
 
-def check_orientations(frame, found, problems):
+def check_orientations(frame: pd.DataFrame, found: Mapping[str, str], problems: Problems) -> pd.DataFrame:
     """The frame with rotation vectors for its quaternions; what is no orientation is noted and NaN."""
     for name, columns in TURNS.items():
         quaternion = QUATERNIONS[name]
@@ -24,18 +28,20 @@ def check_orientations(frame, found, problems):
             frame = _from_quaternions(frame, columns, quaternion, found, problems)
         elif set(columns) <= set(frame):
             size = np.linalg.norm(frame[[*columns]], axis=1)
-            for i in np.flatnonzero(size > _LONGEST_RAD):
+            for i in np.flatnonzero(size > _LONGEST_RAD).tolist():
                 _note(problems, frame, i, [found[one] for one in columns], f"{size[i]:.6g} rad", "at most one turn")
     return frame
 
 
-def _from_quaternions(frame, columns, quaternion, found, problems):
+def _from_quaternions(
+    frame: pd.DataFrame, columns: Sequence[str], quaternion: Sequence[str], found: Mapping[str, str], problems: Problems
+) -> pd.DataFrame:
     """The frame with rotation vectors in place of quaternions."""
     from scipy.spatial.transform import Rotation
 
     parts = frame[[*quaternion]].to_numpy(dtype=float)
     size, vectors = np.linalg.norm(parts, axis=1), np.full((len(parts), 3), np.nan)
-    for i in np.flatnonzero(np.abs(size - 1.0) > _UNIT):
+    for i in np.flatnonzero(np.abs(size - 1.0) > _UNIT).tolist():
         given = [found[one] for one in quaternion]
         _note(problems, frame, i, given, f"a quaternion of length {size[i]:.6g}", "length 1")
     good = np.abs(size - 1.0) <= _UNIT
@@ -44,7 +50,7 @@ def _from_quaternions(frame, columns, quaternion, found, problems):
     return frame.drop(columns=[*quaternion]).assign(**dict(zip(columns, vectors.T, strict=True)))
 
 
-def other_readings(turns, found):
+def other_readings(turns: np.ndarray, found: Mapping[str, str]) -> dict[str, np.ndarray]:
     """What orientations (n, 3, 3) may be instead, (n, 3, 3), by what to write or to mend.
 
     found: the file's column by ours, where orientations came as quaternions with those of their parts.
@@ -63,6 +69,6 @@ def other_readings(turns, found):
     return {key: rotation.as_matrix() for key, rotation in result.items()}
 
 
-def _note(problems, frame, i, columns, value, allowed):
+def _note(problems: Problems, frame: pd.DataFrame, i: int, columns: Sequence[str], value: str, allowed: str) -> None:
     """Note what is wrong with the orientation of row i."""
     problems.add("orientation", row=frame.index[i], column=", ".join(columns), value=value, allowed=allowed)

@@ -10,9 +10,11 @@ reflector that is off from most others of its body was confused with another one
 disagree it is unknown which one is right: both are marked.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
+from typing import TypeAlias
 
 import numpy as np
+import numpy.typing as npt
 import pandas as pd
 
 from rrru.campaign.driven_path import follows_path
@@ -23,11 +25,13 @@ from rrru.campaign.outliers import MAX_ROBUST_SDS, MEDIAN_OF_LENGTH, robust_sd, 
 # Most consecutive bad points that are looked for; the running median's window must hold more good points than bad.
 _LONGEST = 3
 _WINDOW = 2 * _LONGEST + 1
-# ASSUME the robot's own single spikes stay below threshold x 0.1 mm; below threshold x 0.5 and x 0.75 mm where a loose
-# joint that flips and flips back looks like bad points: blocks of two or three, and a run's ends.
+# how many scales of its neighbourhood a point must be off
+_MIN_SCALES = 6.0
+# ASSUME the robot's own single spikes stay below _MIN_SCALES x 0.1 mm; below _MIN_SCALES x 0.5 and x 0.75 mm where a
+# loose joint that flips and flips back looks like bad points: blocks of two or three, and a run's ends.
 _SPIKE_MM, _FLIP_MM, _END_MM = 0.1, 0.5, 0.75
 # ASSUME at most one block of bad points among ten points: a run that jumps more often has a loose joint, and twice its
-# usual jump is allowed, up to threshold x 1.5 mm: no joint is looser.
+# usual jump is allowed, up to _MIN_SCALES x 1.5 mm: no joint is looser.
 _BAD_SHARE, _JUMP_FACTOR, _LOOSEST_MM = 0.1, 2.0, 1.5
 # A bad end point pulls at its neighbour by a third, a bad neighbour at the end by as much as it is off itself.
 _END_PREFERENCE = 1.5
@@ -36,6 +40,11 @@ _END_PREFERENCE = 1.5
 _EXPLAINED = 0.5
 # parameters of a rigid motion; numbers that a fit of the geometry must have to spare
 _RIGID, _LEAST_SPARE = 6, 20
+# distance of a block of points, its limit, and the indices of its points
+_Block: TypeAlias = tuple[float, float, np.ndarray]
+
+# ASSUME the same deviations at a place in two runs differ by less
+_REPEATS_MM = 0.6
 
 # ASSUME no body bends by a millimetre, and reflectors are further apart than that
 _FAR_MM = 1.0
@@ -56,7 +65,7 @@ def outliers(frame: pd.DataFrame, digit_mm: float, jacobian: Callable[[], np.nda
         marked &= far_from_all(deviation, run)
         if marked.any():
             marked &= ~like_geometry(deviation, target, jacobian(), marked)
-    return marked & ~reproduced(marked, deviation, target, run)
+    return np.asarray(marked & ~reproduced(marked, deviation, target, run))
 
 
 def jumps(frame: pd.DataFrame, digit_mm: float) -> np.ndarray:
@@ -64,15 +73,19 @@ def jumps(frame: pd.DataFrame, digit_mm: float) -> np.ndarray:
     target, run = command(frame), series(frame)
     deviation = measured(frame) - target
     found = frequent_jumps(deviation, run, noise_mm=digit_mm)
-    return found & ~reproduced(found, deviation, target, run)
+    return np.asarray(found & ~reproduced(found, deviation, target, run))
 
 
-def flag_outliers(deviation_mm, run, noise_mm=None, threshold=6.0, place=None):
+def flag_outliers(
+    deviation_mm: npt.ArrayLike,
+    run: npt.ArrayLike,
+    noise_mm: float = 0.0,
+    place: npt.ArrayLike | None = None,
+) -> np.ndarray:
     """Mark (n,) of the points that do not fit their neighbours in the run; rows in the order driven.
 
     deviation_mm: measured minus commanded position (n, 3) in mm; rows with a NaN are left out and not marked.
-    run: number of the run (n,). noise_mm: the instrument's noise, one sigma per axis; None takes it as below 0.1 mm.
-    threshold: how many scales of the neighbourhood a point must be off.
+    run: number of the run (n,). noise_mm: the instrument's noise, one sigma per axis, 0 where it is unknown.
     place: where the points lie along their run (n,), growing; None takes them as equally spaced.
 
     A block of one to three points is marked where each of its points lies off the curve through the two points before
@@ -85,14 +98,12 @@ def flag_outliers(deviation_mm, run, noise_mm=None, threshold=6.0, place=None):
         raise ValueError(f"expected deviations (n, 3) and runs (n,), got {deviation.shape} and {run.shape}")
     place = np.arange(len(deviation), dtype=float) if place is None else np.asarray(place, dtype=float)
     marked = np.zeros(len(deviation), dtype=bool)
-    known = np.isfinite(deviation).all(axis=1)
-    for number in np.unique(run[known]):
-        rows = np.flatnonzero(known & (run == number))
-        marked[rows[_bad_points(place[rows], deviation[rows], noise_mm or 0.0, threshold)]] = True
+    for rows in _runs(deviation, run):
+        marked[rows[_bad_points(place[rows], deviation[rows], noise_mm)]] = True
     return marked
 
 
-def frequent_jumps(deviation_mm, run, noise_mm=None, threshold=6.0):
+def frequent_jumps(deviation_mm: npt.ArrayLike, run: npt.ArrayLike, noise_mm: float = 0.0) -> np.ndarray:
     """Points (n,) off the running median of seven in runs where more than a tenth of the points are, ends apart.
 
     Arguments as of `flag_outliers`, which marks few of them or none: a loose joint jumps so often. So does an
@@ -100,18 +111,16 @@ def frequent_jumps(deviation_mm, run, noise_mm=None, threshold=6.0):
     """
     deviation, run = np.asarray(deviation_mm, dtype=float), np.asarray(run)
     result = np.zeros(len(deviation), dtype=bool)
-    known = np.isfinite(deviation).all(axis=1)
-    for number in np.unique(run[known]):
-        rows = np.flatnonzero(known & (run == number))
+    for rows in _runs(deviation, run):
         if len(rows) > _WINDOW:
             # near the ends of a run there are no seven neighbours, and errors may grow fast
             rows, off = rows[_LONGEST:-_LONGEST], _off_median(deviation[rows])[_LONGEST:-_LONGEST]
-            limit = threshold * robust_sd(off, MEDIAN_OF_LENGTH, max(noise_mm or 0.0, _SPIKE_MM))
+            limit = _MIN_SCALES * robust_sd(off, MEDIAN_OF_LENGTH, max(noise_mm, _SPIKE_MM))
             result[rows] = (off > limit) & ((off > limit).mean() > _BAD_SHARE)
     return result
 
 
-def far_from_all(deviation_mm, run, threshold=6.0):
+def far_from_all(deviation_mm: npt.ArrayLike, run: npt.ArrayLike) -> np.ndarray:
     """Points (n,) that are many scales of their whole run off its median, for runs whose points follow no path.
 
     There the robot's errors differ from one point to the next as much as among all of them. Arguments as of
@@ -119,15 +128,15 @@ def far_from_all(deviation_mm, run, threshold=6.0):
     """
     deviation, run = np.asarray(deviation_mm, dtype=float), np.asarray(run)
     result = np.zeros(len(deviation), dtype=bool)
-    known = np.isfinite(deviation).all(axis=1)
-    for number in np.unique(run[known]):
-        rows = np.flatnonzero(known & (run == number))
+    for rows in _runs(deviation, run):
         off = np.linalg.norm(deviation[rows] - np.median(deviation[rows], axis=0), axis=1)
-        result[rows] = off > threshold * robust_sd(off, MEDIAN_OF_LENGTH, _SPIKE_MM)
+        result[rows] = off > _MIN_SCALES * robust_sd(off, MEDIAN_OF_LENGTH, _SPIKE_MM)
     return result
 
 
-def like_geometry(deviation_mm, command_mm, jacobian, marked):
+def like_geometry(
+    deviation_mm: np.ndarray, command_mm: np.ndarray, jacobian: np.ndarray, marked: np.ndarray
+) -> np.ndarray:
     """Which marked points (n,) have the deviation that errors of the geometry make there, at least half of it.
 
     Near a singularity a small error of the geometry moves the platform far. The errors are fitted by least squares to
@@ -147,31 +156,43 @@ def like_geometry(deviation_mm, command_mm, jacobian, marked):
     columns = columns / np.where(size > 0.0, size, 1.0)
     errors = np.linalg.lstsq(columns[fitted].reshape(-1, len(size)), deviation_mm[fitted].ravel())[0]
     left = np.linalg.norm(deviation_mm - columns @ errors, axis=1)
-    return marked & known & (left < _EXPLAINED * np.linalg.norm(deviation_mm, axis=1))
+    return np.asarray(marked & known & (left < _EXPLAINED * np.linalg.norm(deviation_mm, axis=1)))
 
 
-def reproduced(marked, deviation_mm, command_mm, run, tolerance_mm=0.6):
+def reproduced(
+    marked: np.ndarray,
+    deviation_mm: npt.ArrayLike,
+    command_mm: npt.ArrayLike,
+    run: npt.ArrayLike,
+) -> np.ndarray:
     """Which marked points (n,) another run came back to: the robot repeats a spike near a singularity, a beam does not.
 
     Compares deviations (n, 3) in mm at the same commanded position (n, 3) in another run (n,); they repeat within
-    `tolerance_mm`.
+    0.6 mm.
     """
     deviation, command, run = np.asarray(deviation_mm), np.asarray(command_mm), np.asarray(run)
     result = np.zeros(len(deviation), dtype=bool)
     for i in np.flatnonzero(marked):
         repeats = (run != run[i]) & (np.abs(command - command[i]) < 1e-3).all(axis=1)
-        result[i] = (np.linalg.norm(deviation[repeats] - deviation[i], axis=1) < tolerance_mm).any()
+        result[i] = (np.linalg.norm(deviation[repeats] - deviation[i], axis=1) < _REPEATS_MM).any()
     return result
 
 
-def _bad_points(place, deviation, noise_mm, threshold):
+def _runs(deviation: np.ndarray, run: np.ndarray) -> Iterator[np.ndarray]:
+    """Rows of each run (n,) whose deviations (n, 3) are known."""
+    known = np.isfinite(deviation).all(axis=1)
+    for number in np.unique(run[known]):
+        yield np.flatnonzero(known & (run == number))
+
+
+def _bad_points(place: np.ndarray, deviation: np.ndarray, noise_mm: float) -> np.ndarray:
     """Indices of the bad points of one run: the worst block first, then again without it, until none is left.
 
     A good point next to bad ones can be marked with them: each is put back once to see whether it fits the good ones.
     """
 
-    def worst(rows):
-        return _worst_block(place[rows], deviation[rows], noise_mm, threshold) if len(rows) >= _WINDOW else None
+    def worst(rows: np.ndarray) -> np.ndarray | None:
+        return _worst_block(place[rows], deviation[rows], noise_mm) if len(rows) >= _WINDOW else None
 
     good, bad = np.arange(len(deviation)), []
     while (block := worst(good)) is not None:
@@ -183,22 +204,22 @@ def _bad_points(place, deviation, noise_mm, threshold):
     return np.setdiff1d(np.arange(len(deviation)), good)
 
 
-def _worst_block(place, deviation, noise_mm, threshold):
+def _worst_block(place: np.ndarray, deviation: np.ndarray, noise_mm: float) -> np.ndarray | None:
     """Indices of the block that is farthest off among those beyond their limits, or None."""
     jump = np.linalg.norm(np.diff(deviation, axis=0), axis=1)
     usual = np.sort(jump)[::-1][min(2 * max(1, round(_BAD_SHARE * len(place))), len(jump) - 1)]
-    loose = min(_JUMP_FACTOR * usual, threshold * max(_LOOSEST_MM, noise_mm))
+    loose = min(_JUMP_FACTOR * usual, _MIN_SCALES * max(_LOOSEST_MM, noise_mm))
 
-    def farthest(blocks):
+    def farthest(blocks: Iterable[_Block]) -> tuple[float, np.ndarray | None]:
         beyond = [(off, block) for off, limit, block in blocks if off > max(limit, loose)]
         return max(beyond, key=lambda one: one[0], default=(0.0, None))
 
-    inner = farthest(_inner_blocks(place, deviation, noise_mm, threshold))
-    end = farthest(_end_blocks(place, deviation, jump, noise_mm, threshold))
+    inner = farthest(_inner_blocks(place, deviation, noise_mm))
+    end = farthest(_end_blocks(place, deviation, jump, noise_mm))
     return end[1] if end[0] > _END_PREFERENCE * inner[0] else inner[1]
 
 
-def _inner_blocks(place, deviation, noise_mm, threshold):
+def _inner_blocks(place: np.ndarray, deviation: np.ndarray, noise_mm: float) -> Iterator[_Block]:
     """Per length of block: the worst block's least distance from its neighbours' curve, its limit, its indices."""
     off_median = _off_median(deviation)
     for length in range(1, _LONGEST + 1):
@@ -206,19 +227,19 @@ def _inner_blocks(place, deviation, noise_mm, threshold):
         blocks = np.arange(1, len(place) - length)[:, None] + np.arange(length)
         nodes = np.stack([blocks[:, 0] - 2, blocks[:, 0] - 1, blocks[:, -1] + 1, blocks[:, -1] + 2])
         off = _off_curve(place, deviation, blocks, nodes)
-        limit = threshold * robust_sd(off, MEDIAN_OF_LENGTH, floor)
-        least = np.where(off_median[blocks].min(axis=1) > threshold * floor, off.min(axis=1), 0.0)
+        limit = _MIN_SCALES * robust_sd(off, MEDIAN_OF_LENGTH, floor)
+        least = np.where(off_median[blocks].min(axis=1) > _MIN_SCALES * floor, off.min(axis=1), 0.0)
         yield least.max(), limit, blocks[np.argmax(least)]
 
 
-def _off_median(deviation):
+def _off_median(deviation: np.ndarray) -> np.ndarray:
     """Distances (n,) of deviations (n, 3) of one run from their running median."""
     from scipy.ndimage import median_filter
 
-    return np.linalg.norm(deviation - median_filter(deviation, size=(_WINDOW, 1), mode="nearest"), axis=1)
+    return np.asarray(np.linalg.norm(deviation - median_filter(deviation, size=(_WINDOW, 1), mode="nearest"), axis=1))
 
 
-def _off_curve(place, deviation, blocks, nodes):
+def _off_curve(place: np.ndarray, deviation: np.ndarray, blocks: np.ndarray, nodes: np.ndarray) -> np.ndarray:
     """Distances (m, length) of blocks (m, length) from the polynomials through nodes (k, m) within the run."""
     there = (nodes >= 0) & (nodes < len(place))
     nodes = np.clip(nodes, 0, len(place) - 1)
@@ -230,10 +251,10 @@ def _off_curve(place, deviation, blocks, nodes):
             step = np.where(both, place[nodes[i]] - place[nodes[j]], 1.0)[:, None]
             weight *= np.where(both[:, None], (place[blocks] - place[nodes[j]][:, None]) / step, 1.0)
         predicted += weight[..., None] * deviation[nodes[i]][:, None]
-    return np.linalg.norm(deviation[blocks] - predicted, axis=2)
+    return np.asarray(np.linalg.norm(deviation[blocks] - predicted, axis=2))
 
 
-def _end_blocks(place, deviation, jump, noise_mm, threshold):
+def _end_blocks(place: np.ndarray, deviation: np.ndarray, jump: np.ndarray, noise_mm: float) -> Iterator[_Block]:
     """Per end and length: the block's least distance from the predictions, its limit, its indices.
 
     The next point, the line through the next two and the parabola through the next three predict the block. Errors grow
@@ -245,10 +266,12 @@ def _end_blocks(place, deviation, jump, noise_mm, threshold):
             block, nodes = index[:length], index[length : length + 3, None]
             off = min(_off_curve(place, deviation, block[None], nodes[:count]).min() for count in (1, 2, 3))
             growth = gaps[length - 1] / gaps[length] * steps[length]
-            yield off, max(threshold * max(noise_mm, _END_MM), _JUMP_FACTOR * growth), block
+            yield off, max(_MIN_SCALES * max(noise_mm, _END_MM), _JUMP_FACTOR * growth), block
 
 
-def strays(position_mm, stop, names, on_world):
+def strays(
+    position_mm: np.ndarray, stop: np.ndarray, names: np.ndarray, on_world: np.ndarray
+) -> tuple[np.ndarray, dict[int, str]]:
     """Which of n readings (n, 3) at stops (n,) are of another reflector than the named one, and a text on each.
 
     names (n,); on_world (n,): which reflectors are fixed to the world. Returns (marked (n,), texts by row's number),
@@ -259,17 +282,17 @@ def strays(position_mm, stop, names, on_world):
     grid = np.full((at.max() + 1, len(every), 3), np.nan)
     grid[at, number] = position_mm
     fixed = np.array([np.asarray(on_world)[number == k].any() for k in range(len(every))])
-    marked, places = np.zeros(len(at), dtype=bool), np.where(fixed[:, None], np.nanmedian(grid, axis=0), np.nan)
+    places = np.where(fixed[:, None], np.nanmedian(grid, axis=0), np.nan)
     wrong = _moved(grid, places) | _apart(grid, np.flatnonzero(~fixed))
     marked = wrong[at, number]
-    texts = {}
-    for row in np.flatnonzero(marked):
+    texts: dict[int, str] = {}
+    for row in np.flatnonzero(marked).tolist():
         right_mm = np.where(fixed[:, None], places, np.where(wrong[at[row], :, None], np.nan, grid[at[row]]))
-        texts[int(row)] = _text(every, number[row], position_mm[row], right_mm, grid)
+        texts[row] = _text(every, number[row], position_mm[row], right_mm, grid)
     return marked, texts
 
 
-def _moved(grid, places):
+def _moved(grid: np.ndarray, places: np.ndarray) -> np.ndarray:
     """Readings (stops, r) that are not where their reflectors stand, places (r, 3), NaN where these move."""
     off = np.linalg.norm(grid - places, axis=2)
     wrong = np.zeros(off.shape, dtype=bool)
@@ -278,7 +301,7 @@ def _moved(grid, places):
     return wrong
 
 
-def _apart(grid, body):
+def _apart(grid: np.ndarray, body: np.ndarray) -> np.ndarray:
     """Readings (stops, r) of the reflectors of a body, by number, that are off from most of its others."""
     wrong = np.zeros(grid.shape[:2], dtype=bool)
     if len(body) < 2:
@@ -297,14 +320,14 @@ def _apart(grid, body):
     return wrong
 
 
-def _outlying(off):
+def _outlying(off: np.ndarray) -> np.ndarray:
     """Which deviations (stops,) from the usual distance, NaN where unknown, are gross; none where many are."""
     if not np.isfinite(off).any():
         return np.zeros(len(off), dtype=bool)
     return unless_many(off > max(_FAR_MM, MAX_ROBUST_SDS * robust_sd(off[np.isfinite(off)])), _MAX_SHARE)
 
 
-def _text(names, number, position, right_mm, grid):
+def _text(names: np.ndarray, number: int, position: np.ndarray, right_mm: np.ndarray, grid: np.ndarray) -> str:
     """Text on a wrong reading of a reflector, by number; right_mm (r, 3): places of all, NaN where unknown."""
     away = np.linalg.norm(right_mm - position, axis=1)
     near = int(np.nanargmin(np.where(np.arange(len(names)) == number, np.inf, np.nan_to_num(away, nan=np.inf))))

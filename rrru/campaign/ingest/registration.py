@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+import numpy.typing as npt
 
 from rrru.errors import FitError
 
@@ -28,7 +29,7 @@ class Registration:
     off_mm: np.ndarray
 
     @cached_property
-    def covariance(self):
+    def covariance(self) -> np.ndarray:
         """Covariance (6, 6) of the translation in mm and the rotation vector in rad.
 
         It holds for residuals that are random and of one size at all points; NaN for three points (no freedom).
@@ -36,18 +37,19 @@ class Registration:
         return _covariance(self.placed_mm, self.off_mm, self.rotation, self.translation)
 
     @property
-    def numbers(self):
+    def numbers(self) -> np.ndarray:
         """Translation in mm, and rotation vector in rad, (6,)."""
         from scipy.spatial.transform import Rotation
 
         return np.concatenate([self.translation, Rotation.from_matrix(self.rotation).as_rotvec()])
 
-    def apply(self, position_mm):
+    def apply(self, position_mm: npt.ArrayLike) -> np.ndarray:
         """Positions (n, 3) in the robot's frame, mm, of positions (n, 3) in the instrument's frame."""
-        return np.asarray(position_mm, dtype=float) @ self.rotation.T + self.translation
+        moved: np.ndarray = np.asarray(position_mm, dtype=float) @ self.rotation.T + self.translation
+        return moved
 
 
-def register(measured_mm, command_mm):
+def register(measured_mm: npt.ArrayLike, command_mm: npt.ArrayLike) -> Registration:
     """Registration that best maps measured (n, 3) to commanded positions (n, 3), both in mm (least squares; Kabsch's
     solution).
 
@@ -75,7 +77,7 @@ def register(measured_mm, command_mm):
     return Registration(rotation, translation, *sizes, placed, off)
 
 
-def _covariance(placed, off, rotation, translation):
+def _covariance(placed: np.ndarray, off: np.ndarray, rotation: np.ndarray, translation: np.ndarray) -> np.ndarray:
     """Covariance (6, 6) of translation and rotation vector from points (n, 3) and residual distances (n,), mm, rad.
 
     A small motion (s, w) in the robot's frame moves a point p by s + w x p; least squares has the covariance
@@ -98,7 +100,7 @@ def _covariance(placed, off, rotation, translation):
     return variance * slope @ np.linalg.inv(columns.T @ columns) @ slope.T
 
 
-def _require_spread(name, position):
+def _require_spread(name: str, position: np.ndarray) -> None:
     """Raise FitError unless the points (n, 3) span a plane well enough."""
     count, remaining, distinct = len(position), position, 0
     while distinct < 3 and len(remaining):

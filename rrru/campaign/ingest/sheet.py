@@ -1,13 +1,20 @@
 """A measurement file on its way to a measurement table: what its columns mean and what is wrong with it so far."""
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, NoReturn
 
+import numpy as np
 import pandas as pd
 
 from rrru.campaign import measurements as rows
 from rrru.campaign.ingest.problems import Problems
+from rrru.kinematics.chain import Poses
 from rrru.kinematics.robot import Robot
+
+if TYPE_CHECKING:
+    # whose readers of files import the names below
+    from rrru.campaign.ingest.spec import IngestSpec
 
 AXES = ("x", "y", "z")
 COMMAND = tuple(f"command_{axis}_mm" for axis in AXES)
@@ -15,8 +22,8 @@ COMMAND = tuple(f"command_{axis}_mm" for axis in AXES)
 TURNS = {name: tuple(f"{name}_r{axis}_rad" for axis in AXES) for name in ("command", "measured")}
 QUATERNIONS = {name: tuple(f"{name}_q{part}" for part in "xyzw") for name in TURNS}
 _DRIVE_NAMES = {frozenset({"rad"}): "drive angles", frozenset({"mm"}): "slider positions"}
-MEASURED = tuple(f"measured_{axis}_mm" for axis in AXES)
-NOISE = tuple(f"noise_{axis}_mm" for axis in AXES)
+MEASURED: tuple[str, ...] = tuple(f"measured_{axis}_mm" for axis in AXES)
+NOISE: tuple[str, ...] = tuple(f"noise_{axis}_mm" for axis in AXES)
 TARGET = tuple(f"target_{axis}_mm" for axis in AXES)
 
 # rows that a note lists
@@ -31,30 +38,30 @@ class Sheet:
     indexed by the row number, NaN where a cell has been noted.
     """
 
-    spec: Any
+    spec: "IngestSpec"
     mechanism: Robot
     problems: Problems
-    found: dict
+    found: dict[str, str]
     frame: pd.DataFrame
 
     @property
-    def drives(self):
+    def drives(self) -> tuple[str, ...]:
         """Names of the columns of actuator values."""
         return tuple(self.mechanism.parts.columns)
 
     @property
-    def poses(self):
+    def poses(self) -> Poses:
         """Nominal poses (n) at the actuator values, or where these are not stated at the commanded positions."""
-        command = self.frame[[*COMMAND]].to_numpy(dtype=float)
+        command = rows.command(self.frame)
         return self.mechanism.solve(self.actuators(command), command)
 
-    def actuators(self, command):
+    def actuators(self, command: np.ndarray) -> np.ndarray:
         """Actuator values (n, K): those of the file, else those that the commanded poses need."""
         if set(self.drives) <= set(self.frame):
-            return self.frame[[*self.drives]].to_numpy(dtype=float)
+            return np.asarray(self.frame[[*self.drives]].to_numpy(dtype=float))
         return self.needed(self.frame, command)
 
-    def needed(self, frame, command):
+    def needed(self, frame: pd.DataFrame, command: np.ndarray) -> np.ndarray:
         """Actuator values (n, K) that commanded positions (n, 3) need, with the orientations of their rows if any."""
         turned = {}
         if self.mechanism.orients and set(TURNS["command"]) <= set(frame):
@@ -62,32 +69,36 @@ class Sheet:
         return self.mechanism.inverse(command, elbow=self.spec.elbow, **turned)
 
     @property
-    def drive_name(self):
+    def drive_name(self) -> str:
         """Quantity in the columns of actuator values."""
         return drive_name(self.mechanism)
 
-    def note(self, kind, ours, value, allowed, row=None):
+    def note(
+        self, kind: str, ours: str | Sequence[str] | None, value: str, allowed: str, row: int | None = None
+    ) -> None:
         """Note a problem in columns of ours, one name or several, or None."""
-        ours = (ours,) if isinstance(ours, str) else ours
-        column = ", ".join(self.found.get(name, name) for name in ours) if ours else None
-        self.problems.add(kind, row=row, column=column, value=value, allowed=allowed)
+        self.problems.add(kind, row=row, column=self._column(ours), value=value, allowed=allowed)
 
-    def refuse_now(self, ours, value, allowed):
+    def refuse_now(self, ours: str | Sequence[str] | None, value: str, allowed: str) -> NoReturn:
         """Raise IngestError for a problem in columns of ours that leaves nothing more to look at."""
-        self.note("file", ours, value, allowed)
-        self.problems.refuse()
+        self.problems.refuse_now(column=self._column(ours), value=value, allowed=allowed)
+
+    def _column(self, ours: str | Sequence[str] | None) -> str | None:
+        """The file's names of columns of ours."""
+        ours = (ours,) if isinstance(ours, str) else ours
+        return ", ".join(self.found.get(name, name) for name in ours) if ours else None
 
 
-def drive_name(mechanism):
+def drive_name(mechanism: Robot) -> str:
     """Quantity in a robot's columns of actuator values."""
     return _DRIVE_NAMES.get(frozenset(mechanism.parts.units), "actuator values")
 
 
-def rows_text(numbers):
+def rows_text(numbers: Sequence[int] | pd.Index) -> str:
     """Rows by number in words, the first ten of them."""
     return ", ".join(f"row {number}" for number in numbers[:_SHOWN_ROWS]) + ", ..." * (len(numbers) > _SHOWN_ROWS)
 
 
-def position_text(position):
+def position_text(position: Iterable[float]) -> str:
     """A position in mm for a message."""
     return f"({', '.join(f'{value:.6g}' for value in position)}) mm"

@@ -47,7 +47,7 @@ class IngestSpec:
     angle_unit: str = "rad"
     drive_unit: str | None = None
     frame: str = "robot"
-    registration_points: tuple = ()
+    registration_points: tuple[tuple[int, int], ...] = ()
     extra_columns: str = "refuse"
     elbow: str = "out"
     targets: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)

@@ -8,9 +8,11 @@ has the expanded uncertainty U(95), which is twice the standard deviation: cover
 
 import json
 import re
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from rrru.campaign.ingest.cells import decode, fields, separator_of, table
+from rrru.campaign.ingest.cells import Cells, decode, fields, separator_of, table
+from rrru.campaign.ingest.problems import Problems
 from rrru.campaign.ingest.sheet import MEASURED, NOISE
 
 LENGTHS = {
@@ -41,7 +43,7 @@ _LIST = "a point list: // comments, and rows of a point's name, X, Y and Z"
 HEADER_LINES = 50
 
 
-def leica_cells(data, problems, separator=None, decimal="."):
+def leica_cells(data: bytes, problems: Problems, separator: str | None = None, decimal: str = ".") -> Cells:
     """Cells of a Leica-style CSV's bytes: from the line that names X, Y and Z on; see the module."""
     text = decode(data, problems, "comma-separated text with columns X [mm], Y [mm], Z [mm]", ("utf-16", "cp1252"))
     rows, lines = fields(text, separator or ",", problems)
@@ -58,7 +60,7 @@ def leica_cells(data, problems, separator=None, decimal="."):
     return _known(cells, problems, {}, notes)
 
 
-def spatial_analyzer_cells(data, problems, separator=None, decimal="."):
+def spatial_analyzer_cells(data: bytes, problems: Problems, separator: str | None = None, decimal: str = ".") -> Cells:
     """Cells of a SpatialAnalyzer point list's bytes; see the module."""
     text = decode(data, problems, _LIST, ("utf-16", "cp1252"))
     lines = {number: line.strip() for number, line in enumerate(text.splitlines(), start=1)}
@@ -75,7 +77,7 @@ def spatial_analyzer_cells(data, problems, separator=None, decimal="."):
     return _known(cells, problems, _stated_unit(comments, problems), notes)
 
 
-def _split(line, separator):
+def _split(line: str, separator: str) -> list[str]:
     """Stripped fields of a line, those at its end left out that are empty."""
     cells = line.split() if separator == " " else [cell.strip().strip('"') for cell in line.split(separator)]
     while cells and not cells[-1]:
@@ -83,14 +85,17 @@ def _split(line, separator):
     return cells
 
 
-def _named(comments, rows, separator, problems):
+def _named(
+    comments: Sequence[str], rows: list[list[str]], separator: str, problems: Problems
+) -> tuple[list[str], list[list[str]], tuple[str, ...]]:
     """Names of a list's columns, its rows and a note: by its header, or by how many fields it has."""
     headers = [_split(line, one) for line in comments for one in (separator, ",", " ")]
     headers = [names for names in headers if names_axes(names)]
+    notes: tuple[str, ...] = ()
     if names_axes(rows[0]):
-        names, rows, notes = rows[0], rows[1:], ()
+        names, rows = rows[0], rows[1:]
     elif headers:
-        names, notes = headers[-1], ()
+        names = headers[-1]
     else:
         width = max(set(map(len, rows)), key=[len(row) for row in rows].count)
         if width not in _BY_COUNT:
@@ -101,12 +106,12 @@ def _named(comments, rows, separator, problems):
     return names, [row + [""] * (len(names) - len(row)) if row else row for row in rows], notes
 
 
-def names_axes(names):
+def names_axes(names: Sequence[str]) -> bool:
     """Whether x, y and z are among names of columns."""
     return {"x", "y", "z"} <= {_key(name) for name in names}
 
 
-def _stated_unit(comments, problems):
+def _stated_unit(comments: Sequence[str], problems: Problems) -> dict[str, float]:
     """Factor to mm by axis, of the unit that a list's comments state; empty where they state none."""
     words = [word.lower() for line in comments for pair in _UNIT_TEXT.findall(line) for word in pair if word]
     found = {LENGTHS[word]: word for word in words if word in LENGTHS}
@@ -115,7 +120,7 @@ def _stated_unit(comments, problems):
     return {axis: factor for factor in found for axis in "xyz"}
 
 
-def _known(cells, problems, units, notes):
+def _known(cells: Cells, problems: Problems, units: Mapping[str, float], notes: tuple[str, ...]) -> Cells:
     """The cells with what their names mean; units: factor to mm by axis where no name says one."""
     means, factors, spreads = {}, {}, {}
     for name in cells.names:
@@ -136,26 +141,26 @@ def _known(cells, problems, units, notes):
     return replace(cells, means=means, factors=factors, spreads=spreads, unused=unused, notes=tuple(notes))
 
 
-def _length(name, unit, problems):
+def _length(name: str, unit: str, problems: Problems) -> float:
     """Factor to mm of a unit; an unknown one is noted."""
     if unit not in LENGTHS:
         problems.add("unit", column=name, value=f"the unit {unit}", allowed="mm, m, in or µm")
     return LENGTHS.get(unit, 1.0)
 
 
-def _key(name):
+def _key(name: str) -> str:
     """A column's name in small letters, without unit and double spaces."""
     bare = _BRACKET.match(name) if unit_of(name) else None
     return " ".join((bare[1] if bare else name).lower().split())
 
 
-def unit_of(name):
+def unit_of(name: str) -> str | None:
     """The unit in brackets at the end of a column's name, in small letters, or None."""
     found = _BRACKET.match(name)
     return found[2].lower() if found and not re.fullmatch(r"\d*", found[2]) else None
 
 
-def _one_clock(names, rows):
+def _one_clock(names: list[str], rows: list[list[str]]) -> tuple[list[str], list[list[str]]]:
     """Names and rows with one column "Date Time" where date and time of day stand apart."""
     keys = [_key(name) for name in names]
     if not {"date", "time"} <= set(keys):
@@ -163,7 +168,7 @@ def _one_clock(names, rows):
     day, time = keys.index("date"), keys.index("time")
     unchanged = [k for k in range(len(names)) if k not in (day, time)]
 
-    def joined(row):
+    def joined(row: list[str]) -> list[str]:
         if len(row) != len(names):
             return row[:-1]
         return [*(row[k] for k in unchanged), f"{row[day]} {row[time]}".strip()]

@@ -7,13 +7,17 @@ start the frame is fitted first. A zero offset that is confounded with a frame o
 first drive, stays nominal. Lengths in mm, angles in rad.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import TypeAlias
 
 import numpy as np
 from scipy.optimize import least_squares
 
 from rrru.kinematics.base_parameters import MeasurementConfig, candidates_of, choose, direction, open_numbers
-from rrru.kinematics.readings import lacking
+from rrru.kinematics.chain import Poses
+from rrru.kinematics.readings import Readings, lacking
+from rrru.kinematics.robot import Robot
 
 # shares of the robot's size: from the first on a residual may be due to zero offsets, above the second only to these;
 # a fit that leaves less than the third share of the residual explains it
@@ -32,11 +36,15 @@ _LOOSE_MM = 5.0
 _SAME = 1.01
 # residual of a reading whose pose does not close
 _LOST_MM = 1e4
+# actuator values (n, K) and nominal positions (n, 3)
+_Driven: TypeAlias = tuple[np.ndarray, np.ndarray]
 # share of a zero offset's effect that must be independent of frame and reflectors
 _LEAST = 1e-2
 
 
-def found_zeros(robot, driven, seen, frames):
+def found_zeros(
+    robot: Robot, driven: _Driven, seen: Readings, frames: Callable[[Poses], "Framed"]
+) -> tuple[np.ndarray, bool]:
     """Zero offsets (K,) of the actuator values that explain the residual of the frames; zero where they do not.
 
     And whether they are lost: the nominal zeros are no start that leads to them, or one is off by more than LOST.
@@ -56,7 +64,7 @@ def found_zeros(robot, driven, seen, frames):
         left = np.inf if found is None else _off(robot, driven, frames, found)
         if start == 0:
             first_left = left
-        if left < least:
+        if found is not None and left < least:
             best, least = found, left
         if least <= max(_ENOUGH * before, _LOST * robot.size_mm):
             break
@@ -76,28 +84,31 @@ class Framed:
     position_mm: np.ndarray
     model_mm: np.ndarray
     place_mm: np.ndarray
-    unknown: tuple
+    unknown: tuple[str, ...]
 
     @property
-    def off_mm(self):
+    def off_mm(self) -> float:
         """Median distance of the readings from the model."""
         return float(np.median(np.linalg.norm(self.position_mm - self.model_mm, axis=1)))
 
 
-def _off(robot, driven, frames, zeros):
+def _off(robot: Robot, driven: _Driven, frames: Callable[[Poses], "Framed"], zeros: np.ndarray) -> float:
     """Median distance in mm that frames leave at other zeros (K,) of the drives; inf where a pose is lost."""
     poses = robot.solve(driven[0] + zeros, driven[1])
     return frames(poses).off_mm if poses.closed.all() else np.inf
 
 
-def _fitted(robot, driven, seen, frames, zeros):
+def _fitted(
+    robot: Robot, driven: _Driven, seen: Readings, frames: Callable[[Poses], "Framed"], zeros: np.ndarray
+) -> np.ndarray | None:
     """Zeros (K,) fitted with frame and reflectors from a start, None where a pose is lost."""
     values, near = driven[0] + zeros, driven[1]
     poses = robot.solve(values, near)
     if not poses.closed.all():
         return None
     framed = frames(poses)
-    reads = MeasurementConfig(tuple(dict.fromkeys(seen.reflectors.tolist())), framed.unknown, frame=True)
+    reflectors = () if seen.reflectors is None else tuple(dict.fromkeys(seen.reflectors.tolist()))
+    reads = MeasurementConfig(reflectors, framed.unknown, frame=True)
     robot = robot.reading(reads)
     readings = replace(seen, position_mm=framed.position_mm, place_mm=framed.place_mm)
     # frame and reflectors first: the drives explain the remainder
@@ -109,15 +120,15 @@ def _fitted(robot, driven, seen, frames, zeros):
     chosen, _ = choose(columns.reshape(-1, len(numbers)), [True] * len(numbers), _LEAST)
     directions = directions[..., chosen]
 
-    def residual(sizes):
+    def residual(sizes: np.ndarray) -> np.ndarray:
         twists = (directions @ sizes)[None]
         left = lacking(robot, readings, robot.solve(values, near, twists), twists)
         return np.where(np.isfinite(left), left, _LOST_MM).ravel()
 
-    def slope(sizes):
+    def slope(sizes: np.ndarray) -> np.ndarray:
         twists = (directions @ sizes)[None]
         at = robot.map(values, robot.solve(values, near, twists), twists, readings)
-        return -np.nan_to_num(at.columns(directions)).reshape(-1, len(chosen))
+        return np.asarray(-np.nan_to_num(at.columns(directions)).reshape(-1, len(chosen)))
 
     loose = {"loss": "soft_l1", "f_scale": _LOOSE_MM}
     solution = least_squares(residual, np.zeros(len(chosen)), jac=slope, max_nfev=_EVALUATIONS, **loose)

@@ -3,19 +3,23 @@
 The command `rrru check` prints it.
 """
 
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import yaml
 
 from rrru.campaign import measurements as rows
+from rrru.campaign.ingest.cells import Cells
 from rrru.campaign.ingest.columns import REQUIRED, resolve
 from rrru.campaign.ingest.guess import axis_triples
 from rrru.campaign.ingest.problems import Problems
 from rrru.campaign.ingest.sheet import COMMAND, MEASURED, position_text
 from rrru.campaign.ingest.spec import IngestSpec
 from rrru.campaign.stated_motion import STOP_AND_GO
-from rrru.errors import ConfigError, IngestError
+from rrru.errors import ConfigError, IngestError, Problem
+from rrru.kinematics.robot import Robot
 from rrru.pipeline.config import own_robot
 from rrru.pipeline.data_check.costs import costs, enough_poses, without_times
 from rrru.pipeline.data_check.propose import fitting_robots, propose
@@ -57,36 +61,38 @@ class Check:
     ingest accepts the file; turned: whether it has measured orientations.
     """
 
-    section: dict
+    section: dict[str, Any]
     lines: tuple[str, ...]
-    refused: tuple[dict, ...] = ()
+    refused: tuple[Problem, ...] = ()
     turned: bool = False
 
     @property
-    def overlay(self):
+    def overlay(self) -> dict[str, Any]:
         """The overlay to paste."""
         return {"campaigns": {self.name: self.section}}
 
     @property
-    def name(self):
+    def name(self) -> str:
         """A name for the campaign."""
         return "".join(sign if sign.isalnum() or sign in "_-" else "_" for sign in Path(self.section["ingest"]).stem)
 
 
-def check_file(file, config, robot=None, commands=None):
+def check_file(
+    file: str | Path, config: Mapping[str, Any], robot: str | None = None, commands: str | Path | None = None
+) -> Check:
     """The Check of a file for a robot of the configuration.
 
     A campaign of the configuration with this file is used unchanged, with proposals for its missing keys. Raises
     IngestError for a file that cannot be read and ConfigError for an unknown robot.
     """
-    section = next((one for one in config["campaigns"].values() if one.get("ingest") == str(file)), {})
+    section: dict[str, Any] = next((one for one in config["campaigns"].values() if one.get("ingest") == str(file)), {})
     arguments = {key: value for key, value in (("robot", robot), ("commands", commands)) if value}
     given = {"robot": None, "ingest": str(file)} | section | arguments
     if given["robot"] not in config["robots"]:
         named = f"robot is {given['robot']!r}" if given["robot"] else "say which robot: --robot .. (ROBOT=..)"
         known = f"allowed: {', '.join(config['robots'])}, or a URDF or MJCF file, or one of a --config file (CONFIG=..)"
-        fitting = " and ".join(fitting_robots(given, config))
-        raise ConfigError(f"{named}; {known}" + (f"; this file fits {fitting}" if fitting else ""))
+        fitting = fitting_robots(given, config)
+        raise ConfigError(f"{named}; {known}" + (f"; this file fits {' and '.join(fitting)}" if fitting else ""))
     found = propose(given, config)
     section, cells, mechanism, result = found.section, found.cells, found.mechanism, found.result
     lines = [_content(section, cells), *_used(section, cells, mechanism)]
@@ -104,13 +110,13 @@ def check_file(file, config, robot=None, commands=None):
     return Check(section, tuple(lines), found.refused, turned)
 
 
-def _proposed(note):
+def _proposed(note: str) -> str:
     """A note that says of a proposed `motion` that it is proposed, not stated."""
     why = "proposed, since several reflectors are read at a stop or the points follow no path; see that it is right"
     return note.replace(", as stated", f": {why}") if note.startswith("motion: ") else note
 
 
-def _content(section, cells):
+def _content(section: Mapping[str, Any], cells: Cells) -> str:
     """The file, its size and its format."""
     kind = section.get("format") or "as its ending says"
     more = f", commands from {section['commands']}" if "commands" in section else ""
@@ -118,12 +124,12 @@ def _content(section, cells):
     return f"{section['ingest']}: {len(cells.rows)} rows, {columns} columns, format {kind}{more}"
 
 
-def _added(cells):
+def _added(cells: Cells) -> set[str]:
     """Columns of the cells that the file itself does not have."""
     return {"trajectory"} if any(note.startswith("no column trajectory") for note in cells.notes) else set()
 
 
-def _used(section, cells, mechanism):
+def _used(section: Mapping[str, Any], cells: Cells, mechanism: Robot) -> Iterator[str]:
     """The used, unused and missing columns."""
     spec = replace(IngestSpec.from_config(section), extra_columns="ignore")
     found, extra = resolve(spec, cells, mechanism, Problems(spec.path))
@@ -151,7 +157,7 @@ def _used(section, cells, mechanism):
         yield f"missing: {', '.join(optional)}"
 
 
-def _meant(found, mechanism):
+def _meant(found: Mapping[str, str], mechanism: Robot) -> Iterator[str]:
     """Reference points of commanded positions and payloads."""
     tool = f"the tool, {position_text(mechanism.tool_mm)} on the platform"
     others = ", whatever target a row is of" if "target" in found else ""
@@ -160,7 +166,13 @@ def _meant(found, mechanism):
     yield f"meant: payload_kg{'' if 'payload_kg' in found else ', where you add it,'} hangs at {tool}"
 
 
-def print_check(file, config, robot=None, commands=None, overlays=()):
+def print_check(
+    file: str | Path,
+    config: Mapping[str, Any],
+    robot: str | None = None,
+    commands: str | Path | None = None,
+    overlays: Sequence[str | Path] = (),
+) -> bool:
     """Print the check of a file; returns whether ingest accepts it. Arguments and errors as for `check_file`.
 
     overlays: files of the configuration, for the command that is proposed.
@@ -185,7 +197,7 @@ def print_check(file, config, robot=None, commands=None, overlays=()):
     return not found.refused
 
 
-def _pasted(found, robots):
+def _pasted(found: Check, robots: Mapping[str, Any]) -> str:
     """The overlay as text, with the values that no file has as comments; robots: entries that it needs as well."""
     lines = yaml.safe_dump({"robots": robots}, sort_keys=False).splitlines() if robots else []
     lines += ["campaigns:", f"  {yaml.safe_dump(found.name).splitlines()[0]}:"]

@@ -1,6 +1,10 @@
 """What a campaign cannot determine, from its columns and its motion alone, before any fit."""
 
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any
+
 import numpy as np
+import pandas as pd
 
 from rrru.campaign import measurements as rows
 from rrru.campaign.driven_path import passes_points
@@ -9,11 +13,14 @@ from rrru.diagnosis.determined import poses_needed, require_determined
 from rrru.diagnosis.diagnose import with_wide_bounds
 from rrru.diagnosis.make_problem import make_case
 from rrru.diagnosis.options import OPTIONS
+from rrru.diagnosis.problem import Case
 from rrru.diagnosis.settings import GapSettings
 from rrru.errors import FitError, RrruError
 from rrru.kinematics.dynamics import Masses
+from rrru.kinematics.robot import Robot
 from rrru.pipeline import config as parts
 from rrru.pipeline import setup
+from rrru.pipeline.config import RobotPart
 
 # share of points from the other side below which a drive counts as always approached from one side
 _ONE_WAY = 0.02
@@ -28,7 +35,7 @@ _REMEDIES = {
 }
 
 
-def costs(measurements, config, section):
+def costs(measurements: pd.DataFrame, config: Mapping[str, Any], section: Mapping[str, Any]) -> list[str]:
     """Sentences on what the measurements of a campaign's section cannot determine; empty for no such limit."""
     nominal = parts.robot(config, section)
     said = [*_readings(measurements, setup.mechanism(nominal), section), *_passes(measurements, section)]
@@ -51,17 +58,17 @@ def costs(measurements, config, section):
         case = require_determined(case)
     except FitError as error:
         said.insert(0, f"no diagnosis: {error}")
-    return [*_numbers(nominal, robot), *said, *_untested(case), *_one_way(case), _poses(case)]
+    return [*_numbers(nominal, robot), *said, *_untested(case), *_one_way(case, robot.parts.columns), _poses(case)]
 
 
-def _poses(case):
+def _poses(case: Case) -> str:
     """Sentence on the number of poses that the calibration needs."""
     rank, needed, read = poses_needed(case)
     spare = f"{OPTIONS.min_spare_numbers} degrees of freedom to spare"
     return f"{read} poses are read; their {rank} identifiable parameters need at least {needed}, with {spare}"
 
 
-def enough_poses(mechanism):
+def enough_poses(mechanism: Robot) -> str:
     """Sentence on the number of poses of one reflector that are enough for all parameters of a robot."""
     count = len(mechanism.parameters)
     poses = -(-(count + OPTIONS.min_spare_numbers) // 3)
@@ -71,14 +78,14 @@ def enough_poses(mechanism):
     )
 
 
-def without_times(config, mechanism):
+def without_times(config: Mapping[str, Any], mechanism: Robot) -> list[str]:
     """Sentences on effects of a robot that are not testable in a file without times."""
     library = GapSettings.from_config(config["gap"]).library(mechanism)
     names = [name for name, effect in library.items() if {"time_s", "drive_rate"} & set(effect.needs)]
     return [f"not testable without times: {', '.join(names)}; add {_REMEDIES['time_s']}"] if names else []
 
 
-def _numbers(nominal, robot):
+def _numbers(nominal: RobotPart, robot: Robot) -> Iterator[str]:
     """Sentence on the robot's parameters that are not identifiable from the poses."""
     identifiable = set(robot.parameters.names)
     lost = [name for name in setup.mechanism(nominal).parameters.names if name not in identifiable]
@@ -87,9 +94,9 @@ def _numbers(nominal, robot):
         yield f"not identifiable from these poses: {', '.join(lost[:_SHOWN])}{more}; the calibration fixes them"
 
 
-def _untested(case):
+def _untested(case: Case) -> Iterator[str]:
     """Sentences on effects that are not testable, by the reason."""
-    reasons = {}
+    reasons: dict[str, list[str]] = {}
     for name, reason in case.untestable.items():
         reasons.setdefault(reason, []).append(name)
     for reason, names in reasons.items():
@@ -98,24 +105,20 @@ def _untested(case):
         yield f"not testable: {', '.join(names)} ({reason}){remedy}"
 
 
-def _one_way(case):
-    """Sentence on drives that approach every point from the same side."""
+def _one_way(case: Case, columns: Iterable[str]) -> Iterator[str]:
+    """Sentence on drives, by their columns, that approach every point from the same side."""
     motion = case.motion
     before = motion.path_drive[np.maximum(motion.path_index - 1, 0)]
     known = np.isfinite(motion.last_move).all(axis=1)
     step = np.where(known[:, None], np.nan_to_num(motion.last_move), motion.drive - before)[case.used]
     up, down = (step > 0.0).mean(axis=0), (step < 0.0).mean(axis=0)
-    same = [
-        column
-        for column, one, other in zip(case.mechanism.parts.columns, up, down, strict=True)
-        if min(one, other) < _ONE_WAY
-    ]
+    same = [column for column, one, other in zip(columns, up, down, strict=True) if min(one, other) < _ONE_WAY]
     if same:
         drives = ", ".join(same)
         yield f"always approached from one side: {drives}; backlash is confounded with an offset: also drive back"
 
 
-def _passes(measurements, section):
+def _passes(measurements: pd.DataFrame, section: Mapping[str, Any]) -> Iterator[str]:
     """Sentences on missing repetitions: places at other times, noise, payloads."""
     command = measurements[["command_x_mm", "command_y_mm", "command_z_mm"]].round(3)
     runs = measurements["run"].groupby([*command.to_numpy().T]).nunique()
@@ -129,7 +132,7 @@ def _passes(measurements, section):
         yield f"one payload: compliance shows under the robot's own weight only{mass}"
 
 
-def _estimated_noise(measurements):
+def _estimated_noise(measurements: pd.DataFrame) -> str:
     """Sentence on what counts as noise where it is neither stated nor determined by repeated points."""
     repeats = repeat_noise(measurements)[1] // 3
     needed = -(-ENOUGH_REPEATS // 3)
@@ -140,7 +143,7 @@ def _estimated_noise(measurements):
     return f"noise_mm is not stated and {found}, where {needed} would determine it: {rough}; state noise_mm"
 
 
-def _readings(measurements, robot, section):
+def _readings(measurements: pd.DataFrame, robot: Robot, section: Mapping[str, Any]) -> Iterator[str]:
     """Sentences on what positions of one point do not determine on robots that rotate their platform."""
     few_targets = "target" not in measurements or measurements["target"].nunique() < 3
     if robot.orients and few_targets and not rows.has_turns(measurements):

@@ -1,10 +1,13 @@
 """Missing keys of a campaign's section, found by trial, for the user to accept."""
 
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
+from typing import Any, TypeAlias
 
 import numpy as np
+import pandas as pd
 
 from rrru.campaign import measurements as rows
 from rrru.campaign.driven_path import passes_points, stops
@@ -19,7 +22,7 @@ from rrru.campaign.ingest.problems import Problems
 from rrru.campaign.ingest.sheet import COMMAND
 from rrru.campaign.ingest.spec import MM, RAD, IngestSpec
 from rrru.campaign.stated_motion import STOP_AND_GO
-from rrru.errors import IngestError, RrruError
+from rrru.errors import IngestError, Problem, RrruError
 from rrru.kinematics.robot import Robot
 from rrru.pipeline import config as parts
 from rrru.pipeline import setup
@@ -30,6 +33,9 @@ _PROBES = 20
 _MIN_REACHED = 0.9
 
 
+Section: TypeAlias = dict[str, Any]
+
+
 @dataclass(frozen=True)
 class Proposal:
     """A proposal for a campaign's section.
@@ -38,23 +44,23 @@ class Proposal:
     refused: its problems.
     """
 
-    section: dict
+    section: Section
     cells: Cells
     mechanism: Robot
     result: Ingested | None
-    refused: tuple[dict, ...]
+    refused: tuple[Problem, ...]
 
 
-def propose(section, config):
+def propose(section: Section, config: Mapping[str, Any]) -> Proposal:
     """The Proposal for a section that names file and robot; raises IngestError for a file that cannot be read."""
     mechanism = setup.mechanism(parts.robot(config, section))
     if "columns" in section and (stated := _as_stated(section, mechanism)):
         return _with_motion(stated)
     cells, section = _with_columns(_with_formats(section), mechanism)
-    return _with_motion(Proposal(*_fitting(section, cells, mechanism)))
+    return _with_motion(_fitting(section, cells, mechanism))
 
 
-def _as_stated(section, mechanism):
+def _as_stated(section: Section, mechanism: Robot) -> Proposal | None:
     """The Proposal of a section that states its columns and is accepted as it is, None for any other."""
     try:
         spec = IngestSpec.from_config(section)
@@ -64,7 +70,7 @@ def _as_stated(section, mechanism):
         return None
 
 
-def _with_motion(found):
+def _with_motion(found: Proposal) -> Proposal:
     """The Proposal with a `motion` where none is stated: stop and go where several targets were read at a stop, or the
     points follow no path.
     """
@@ -77,7 +83,7 @@ def _with_motion(found):
     return replace(found, section=section, result=ingest(IngestSpec.from_config(section), found.mechanism))
 
 
-def fitting_robots(section, config):
+def fitting_robots(section: Section, config: Mapping[str, Any]) -> list[str]:
     """Names of the configuration's robots that fit the file of a section; the named one alone if it fits.
 
     A robot fits if its actuator positions give the commanded positions, or if it reaches these where the file has no
@@ -92,14 +98,14 @@ def fitting_robots(section, config):
     return [name for name, machine in machines.items() if _belongs(section, machine, drives)]
 
 
-def _with_formats(section):
+def _with_formats(section: Section) -> Section:
     """The section with the formats of the measured file and that of the commands, where they need one."""
     for key, name in (("format", "ingest"), ("commands", "commands")):
         section = _with_format(section, key, name)
     return section
 
 
-def _with_format(section, key, name):
+def _with_format(section: Section, key: str, name: str) -> Section:
     """The section with the format of the measured file, or that of the commands, if it needs one."""
     given = section.get(name)
     if given is None or (key in section and key == "format") or isinstance(given, dict):
@@ -114,7 +120,7 @@ def _with_format(section, key, name):
     return section | ({"format": found} if key == "format" else {"commands": {"file": given, "format": found}})
 
 
-def _with_columns(section, mechanism):
+def _with_columns(section: Section, mechanism: Robot) -> tuple[Cells, Section]:
     """Cells of the file, and the section with the guessed columns."""
     spec = IngestSpec.from_config(section)
     problems = Problems(spec.path)
@@ -136,14 +142,14 @@ def _with_columns(section, mechanism):
     return cells, section | ({"extra_columns": "ignore"} if extra else {})
 
 
-def _found(section, cells, mechanism):
+def _found(section: Section, cells: Cells, mechanism: Robot) -> tuple[dict[str, str], IngestSpec]:
     """{our name: the file's} of the columns of a section's file, and the section's IngestSpec."""
     spec = replace(IngestSpec.from_config(section), extra_columns="ignore")
     return resolve(spec, cells, mechanism, Problems(spec.path))[0], spec
 
 
-def _fitting(section, cells, mechanism):
-    """The parts of a Proposal with the first units and frame for which ingest accepts the file.
+def _fitting(section: Section, cells: Cells, mechanism: Robot) -> Proposal:
+    """The Proposal with the first units and frame for which ingest accepts the file.
 
     Stated units and frame stay; those in the file's header are tried first. Where none fits, the section has those of
     the first attempt with the fewest problems of whole columns; a unit does not affect problems of single rows.
@@ -153,25 +159,25 @@ def _fitting(section, cells, mechanism):
     guessed = guess_units(cells, _found(section, cells, mechanism)[0], mechanism)
     choices |= {key: tuple(dict.fromkeys((unit, *choices[key]))) for key, unit in guessed.items()}
     open_choices = [((section[key],) if key in section else values) for key, values in choices.items()]
-    attempts = []
+    attempts: list[Proposal] = []
     for values in product(*open_choices):
         chosen = dict(zip(choices, values, strict=True))
         stated = section | {key: value for key, value in chosen.items() if key in section or value != usual[key]}
         try:
-            return stated, cells, mechanism, ingest(IngestSpec.from_config(stated), mechanism), ()
+            return Proposal(stated, cells, mechanism, ingest(IngestSpec.from_config(stated), mechanism), ())
         except IngestError as error:
-            attempts.append((stated, cells, mechanism, None, error.problems))
-        if all(problem["row"] is not None for problem in attempts[-1][-1]):
+            attempts.append(Proposal(stated, cells, mechanism, None, error.problems))
+        if all(problem["row"] is not None for problem in attempts[-1].refused):
             break
-    return min(attempts, key=lambda attempt: _of_all_rows(attempt[-1]))
+    return min(attempts, key=lambda attempt: _of_all_rows(attempt.refused))
 
 
-def _of_all_rows(problems):
+def _of_all_rows(problems: Iterable[Problem]) -> int:
     """Number of problems of whole columns: another unit or frame, not single cells."""
     return sum(problem["row"] is None and problem["column"] is not None for problem in problems)
 
 
-def _belongs(section, mechanism, drives):
+def _belongs(section: Section, mechanism: Robot, drives: set[str]) -> bool:
     """Whether a file may be of a robot, from some of its rows; drives: names of the columns of all robots."""
     try:
         cells, section = _with_columns(_of_robot(section, mechanism), mechanism)
@@ -196,7 +202,7 @@ def _belongs(section, mechanism, drives):
     return any(share > _MIN_REACHED for share in reached)
 
 
-def _driven_there(frame, mechanism, unit, angle):
+def _driven_there(frame: pd.DataFrame, mechanism: Robot, unit: float, angle: float) -> bool:
     """Whether actuator positions give the commanded positions, angles and lengths times factors."""
     factors = [angle if one == "rad" else unit for one in mechanism.parts.units]
     command = unit * rows.command(frame)
@@ -204,7 +210,7 @@ def _driven_there(frame, mechanism, unit, angle):
     return bool((np.linalg.norm(driven - command, axis=1) <= frame_limit(mechanism)).mean() > 0.5)
 
 
-def _of_robot(section, mechanism):
+def _of_robot(section: Section, mechanism: Robot) -> Section:
     """The section with only those columns that a robot may have."""
     if "columns" not in section:
         return section

@@ -1,15 +1,19 @@
 """Calibrations of one campaign on every set of trajectories."""
 
+from collections.abc import Mapping
+from typing import Any
+
 import pandas as pd
 
 from rrru.calibration import campaign_fit
+from rrru.calibration.calibrate import Calibration
 from rrru.calibration.campaign_noise import Noise
 from rrru.calibration.schemas import TABLES
 from rrru.pipeline import setup
 from rrru.store import json_files, tables
 
 
-def main(settings, inputs, outputs):
+def main(settings: Mapping[str, Any], inputs: Mapping[str, str], outputs: Mapping[str, str]) -> None:
     """Write the campaign's calibrations, parameters, fixed non-identifiable parameters, correlations and observability.
 
     And what the robot was taken for, with which the calibration can be applied to other measurements.
@@ -18,7 +22,9 @@ def main(settings, inputs, outputs):
     write(settings, frames, tables.read(inputs["campaigns"]), outputs)
 
 
-def calibrate(settings, measurements, campaigns):
+def calibrate(
+    settings: Mapping[str, Any], measurements: pd.DataFrame, campaigns: pd.DataFrame
+) -> tuple[dict[str, pd.DataFrame], dict[tuple[str, str], Calibration]]:
     """Frames by table name, and {(set, method): Calibration}.
 
     measurements, campaigns: the campaign's tables. Raises ConfigError where no set of trajectories can be fitted.
@@ -32,7 +38,9 @@ def calibrate(settings, measurements, campaigns):
     return frames | campaign_fit.tables(settings["campaign"], fits, truth), fits
 
 
-def write(settings, frames, campaigns, paths):
+def write(
+    settings: Mapping[str, Any], frames: Mapping[str, pd.DataFrame], campaigns: pd.DataFrame, paths: Mapping[str, str]
+) -> None:
     """Write the frames of `calibrate`, and paths["robot"], to paths by table name."""
     noise = _noise(campaigns)
     fitted = {"noise_mm": noise.mm, "arm_mm": noise.arm_mm, "calibration": settings["calibration"]}
@@ -40,7 +48,7 @@ def write(settings, frames, campaigns, paths):
     tables.write_all(TABLES, frames, paths)
 
 
-def _noise(campaigns):
+def _noise(campaigns: pd.DataFrame) -> Noise:
     """The Noise of the campaign's row of `campaigns`."""
     info = campaigns.iloc[0]
     return Noise(info["noise_mm"], info["noise_rad"], info["noise_from"])

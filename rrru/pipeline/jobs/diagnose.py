@@ -1,5 +1,8 @@
 """Diagnosis of one campaign's gap between calibrated model and measurements, with its figures."""
 
+from collections.abc import Callable, Mapping
+from typing import Any
+
 import pandas as pd
 
 from rrru.campaign.noise import read_noise
@@ -10,12 +13,13 @@ from rrru.diagnosis.settings import GapSettings
 from rrru.diagnosis.verdict_text import answer
 from rrru.figures.drawing import draw_all
 from rrru.kinematics.dynamics import Masses
+from rrru.kinematics.robot import Robot
 from rrru.pipeline import setup
 from rrru.robots.drive_words import drive_words
 from rrru.store import json_files, tables
 
 
-def main(settings, inputs, outputs):
+def main(settings: Mapping[str, Any], inputs: Mapping[str, str], outputs: Mapping[str, str]) -> None:
     """Write the verdict, its tables and its figures."""
     measurements = tables.read(inputs["measurements"])
     result = diagnose(settings, measurements)
@@ -24,7 +28,9 @@ def main(settings, inputs, outputs):
     write(settings, result, setup.measured_robot(settings["robot"], measurements), outputs)
 
 
-def diagnose(settings, measurements, progress=None):
+def diagnose(
+    settings: Mapping[str, Any], measurements: pd.DataFrame, progress: Callable[[str], None] | None = None
+) -> core.Diagnosis:
     """The `rrru.diagnosis.diagnose.Diagnosis` of a campaign's measurement table.
 
     progress: called with the name of each step before it begins. Raises FitError where the readings do not determine
@@ -44,21 +50,23 @@ def diagnose(settings, measurements, progress=None):
     return core.diagnose(measurements, robot, chosen, progress=progress)
 
 
-def with_corrected(settings, result, path):
+def with_corrected(settings: Mapping[str, Any], result: core.Diagnosis, path: str) -> core.Diagnosis:
     """The Diagnosis with what its robot's corrected file leaves; writes the file to a path."""
     # MuJoCo is loaded only where a file is written
     from rrru.diagnosis.correction.corrected_model import write_corrected
 
     masses = Masses(**settings["masses"])
-    return write_corrected(result, settings["robot"]["dimensions"], masses, path, settings["seed"])
+    corrected: core.Diagnosis = write_corrected(result, settings["robot"]["dimensions"], masses, path, settings["seed"])
+    return corrected
 
 
-def facts(settings, result, nominal):
+def facts(settings: Mapping[str, Any], result: core.Diagnosis, nominal: Robot) -> dict[str, Any]:
     """The answer of a Diagnosis as the mapping of `verdict.json`; nominal: the robot as measured."""
-    return answer(settings["campaign"], result.verdict, result.tables, drive_words(nominal))
+    answers: dict[str, Any] = answer(settings["campaign"], result.verdict, result.tables, drive_words(nominal))
+    return answers
 
 
-def frames_of(settings, result):
+def frames_of(settings: Mapping[str, Any], result: core.Diagnosis) -> dict[str, pd.DataFrame]:
     """Frames of a Diagnosis by table name, with the campaign's name."""
     frames = {"gap_verdicts": pd.DataFrame([result.verdict]), **result.tables}
     keys = {table.name: table.key for table in TABLES}
@@ -68,7 +76,7 @@ def frames_of(settings, result):
     }
 
 
-def write(settings, result, nominal, paths):
+def write(settings: Mapping[str, Any], result: core.Diagnosis, nominal: Robot, paths: Mapping[str, str]) -> None:
     """Write verdict, tables and figures of a Diagnosis to paths by name; nominal: the robot as measured."""
     json_files.write(facts(settings, result, nominal), paths["verdict"])
     frames = frames_of(settings, result)
@@ -76,7 +84,12 @@ def write(settings, result, nominal, paths):
     draw_all(settings["figures"], {name: paths[name] for name in frames}, figure_options(settings, nominal), paths)
 
 
-def figure_options(settings, nominal):
+def figure_options(settings: Mapping[str, Any], nominal: Robot) -> dict[str, Any]:
     """Options of the figures of a diagnosis; nominal: the robot as measured."""
     words = drive_words(nominal)
-    return settings["options"] | {"z_down": nominal.z_down, "drives": words.all_names, "drive_noun": words.noun}
+    options: dict[str, Any] = settings["options"] | {
+        "z_down": nominal.z_down,
+        "drives": words.all_names,
+        "drive_noun": words.noun,
+    }
+    return options

@@ -1,6 +1,8 @@
 """The genetic algorithm with the chosen settings on all calibration sets of a campaign, compared with least squares."""
 
+from collections.abc import Mapping
 from fnmatch import fnmatchcase
+from typing import Any
 
 import pandas as pd
 from tqdm import tqdm
@@ -18,12 +20,12 @@ from rrru.store import tables
 _WRITTEN = (*GENETIC_TABLES, "timings")
 
 
-def main(settings, inputs, outputs):
+def main(settings: Mapping[str, Any], inputs: Mapping[str, str], outputs: Mapping[str, str]) -> None:
     """Write the campaign's runs, their history, the comparison with least squares and the times."""
     write(genetic(settings, {name: tables.read(path) for name, path in inputs.items()}), outputs)
 
 
-def genetic(settings, read):
+def genetic(settings: Mapping[str, Any], read: Mapping[str, pd.DataFrame]) -> dict[str, pd.DataFrame]:
     """Frames by table name of all runs, empty ones where `genetic.campaigns` does not name the campaign.
 
     read: frames of `measurements`, `calibrations` and `parameters`.
@@ -35,12 +37,12 @@ def genetic(settings, read):
     return {table: frame.assign(campaign=campaign) for table, frame in frames.items()}
 
 
-def write(frames, paths):
+def write(frames: Mapping[str, pd.DataFrame], paths: Mapping[str, str]) -> None:
     """Write the frames of `genetic` to paths by table name."""
     tables.write_all(TABLES, frames, paths)
 
 
-def _runs(settings, read, searched):
+def _runs(settings: Mapping[str, Any], read: Mapping[str, pd.DataFrame], searched: str) -> dict[str, pd.DataFrame]:
     """Frames by table of all runs; searched: the searched set of parameters."""
     genetic, name, nominal = settings["genetic"], settings["campaign"], settings["nominal"]
     calibration = settings["calibration"]

@@ -1,5 +1,8 @@
 """One campaign: driven by a virtual robot or read from a file."""
 
+from collections.abc import Mapping, Sequence
+from typing import Any
+
 import pandas as pd
 
 from rrru.calibration.campaign_noise import campaign_noise
@@ -9,7 +12,7 @@ from rrru.store import tables
 from rrru.store.job import tell
 
 
-def main(settings, inputs, outputs):
+def main(settings: Mapping[str, Any], inputs: Mapping[str, str], outputs: Mapping[str, str]) -> None:
     """Write measurements, truth (empty for a file), singularity measures, workspace slices and the campaign's row."""
     advice = [tables.read(inputs[key]) for key in ("next_runs", "next_poses") if inputs.get(key)]
     frames = read(settings, advice)
@@ -18,7 +21,7 @@ def main(settings, inputs, outputs):
     write(settings, frames, outputs)
 
 
-def read(settings, advice=()):
+def read(settings: Mapping[str, Any], advice: Sequence[pd.DataFrame] = ()) -> dict[str, pd.DataFrame]:
     """Frames by table name of a campaign.
 
     advice: tables `gap_next_runs` and `gap_next_poses` that a virtual campaign follows, or nothing. Raises IngestError
@@ -53,13 +56,13 @@ def read(settings, advice=()):
     }
 
 
-def write(settings, frames, paths):
+def write(settings: Mapping[str, Any], frames: Mapping[str, pd.DataFrame], paths: Mapping[str, str]) -> None:
     """Write the frames of `read` to paths by table name."""
     measurements = frames["measurements"]
     table = measurement_table(setup.mechanism(settings["nominal"]), measurements.columns)
     tables.write_all((*TABLES, table), frames, paths)
 
 
-def _columns(name):
+def _columns(name: str) -> list[str]:
     """The columns of a campaign's table."""
     return next(table.names for table in TABLES if table.name == name)

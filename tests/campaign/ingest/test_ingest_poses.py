@@ -249,6 +249,20 @@ def test_joints_alone_do_for_a_parallel_robot(tmp_path):
     assert any("no commanded positions" in note for note in found.notes)
 
 
+def test_a_command_out_of_reach_is_named_where_orientations_were_measured(tmp_path):
+    robot = Rrru3()
+    point = np.random.default_rng(1).uniform((-300.0, -300.0, 500.0), (300.0, 300.0, 800.0), (30, 3))
+    readings = rows.vector_columns("measured", point + 0.1) | rows.turn_columns(
+        "measured", np.tile(np.eye(3), (30, 1, 1))
+    )
+    point[3] = 0.0, 0.0, 1e4
+    table = pd.DataFrame({"trajectory": "a", **rows.vector_columns("command", point), **readings})
+    with pytest.raises(
+        IngestError, match=r"row 5, .*got \(0, 0, 10000\) mm; allowed: a position that the robot reaches"
+    ):
+        _taken(tmp_path, table, robot)
+
+
 def test_an_orientation_that_was_not_measured_is_left_blank(arm, driven, tmp_path):
     table = _file(arm, driven, registered=False)
     table.loc[3:9, _QUATERNION] = np.nan
