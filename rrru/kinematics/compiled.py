@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast
 
 import numba
 import numba.experimental.function_type  # registers the protocol below
@@ -50,8 +50,11 @@ class CompiledObjective:
         return values
 
 
-@intrinsic
-def fma(_typing: Any, _a: Any, _b: Any, _c: Any) -> tuple[Any, Callable[..., Any]]:
+def _fma(_typing: Any, _a: Any, _b: Any, _c: Any) -> tuple[Any, Callable[..., Any]]:
     """The sum a b + c rounded once, said explicitly: what a compiler may fuse depends on what it has inlined."""
     number = types.float64
     return number(number, number, number), lambda _context, builder, _signature, values: builder.fma(*values)
+
+
+# compiled code, which alone calls it, gives it the three numbers without the compiler's own first argument
+fma = cast(Callable[[float, float, float], float], intrinsic(_fma))
