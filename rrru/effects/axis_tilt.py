@@ -21,13 +21,15 @@ Source: geometry; tolerances of drive axes as in Mooring, Roth and Driels, Funda
 
 import numpy as np
 
-from rrru.effects.protocol import Effect, leg_parameters, plain_coordinates
+from rrru.effects.protocol import Contribution, Effect, Motion, leg_parameters, plain_coordinates
+from rrru.kinematics.arrays import FloatArray
+from rrru.kinematics.robot import Robot
 from rrru.parameters import ParameterSet
 
 _TILTS = (("tilt_x", "rad", -0.03, 0.03), ("tilt_z", "rad", -0.03, 0.03))
 
 
-def for_robot(robot):
+def for_robot(robot: Robot) -> Effect | None:
     """The effect model for legs whose drives turn about an axis on the base, None without such."""
     feet = robot.parts.feet
     if not feet or "mm" in robot.parts.units:
@@ -36,6 +38,6 @@ def for_robot(robot):
     return Effect("axis_tilt", parameters, plain_coordinates(parameters, 1e-3), _seats)
 
 
-def _seats(motion, values):
+def _seats(motion: Motion, values: FloatArray) -> Contribution:
     """Twists of the feet under tilts about x and z of leg 1, then of the others, (2 legs,) in rad."""
     return motion.at_feet(np.insert(np.reshape(values, (-1, 2)), 1, 0.0, axis=1))

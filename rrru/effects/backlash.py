@@ -21,10 +21,12 @@ size is assumed: cheaper worm and planetary drives have some arc minutes, 1 arc 
 the backlash of its nut in mm (paper B, section 3.1).
 """
 
-import numba
 import numpy as np
 
-from rrru.effects.protocol import PATH, Effect, drive_parameters, of_drives, plain_coordinates
+from rrru.effects.protocol import PATH, Contribution, Effect, Motion, drive_parameters, of_drives, plain_coordinates
+from rrru.kinematics.arrays import FloatArray
+from rrru.kinematics.robot import Robot
+from rrru.kinematics.typed_numba import njit
 from rrru.parameters import ParameterSet
 
 _SOURCE = {
@@ -35,8 +37,8 @@ _HIGHEST = {"rad": ("rad", 0.0, 0.02), "mm": ("mm", 0.0, 1.0)}
 _TYPICAL = {"rad": 5e-4, "mm": 0.02}
 
 
-@numba.njit(cache=True)
-def play(path, half_width):
+@njit(cache=True)
+def play(path: FloatArray, half_width: FloatArray) -> FloatArray:
     """Play operator along a path (N, k) with half widths (k,), same unit: y - u (N, k), NaN where unknown."""
     result = np.empty_like(path)
     for leg in range(path.shape[1]):
@@ -51,13 +53,13 @@ def play(path, half_width):
     return result
 
 
-def _lost_motion(motion, values):
+def _lost_motion(motion: Motion, values: FloatArray) -> Contribution:
     """Changes of the actuator values under widths (K,) in their unit."""
     changes = play(np.ascontiguousarray(motion.path_drive), 0.5 * values)[motion.path_index]
     return motion.at_drives(motion.with_approach(changes, -0.5 * values))
 
 
-def for_robot(robot):
+def for_robot(robot: Robot) -> Effect:
     """The effect model for all drives."""
     drives = robot.parts.drives
     parameters = ParameterSet(drive_parameters(drives, _SOURCE, ("width", _HIGHEST)))

@@ -17,11 +17,13 @@ effector. Typical size assumed: 0.1 mm.
 
 import numpy as np
 
-from rrru.effects.protocol import Effect, leg_parameters, plain_coordinates
+from rrru.effects.protocol import Contribution, Effect, Motion, leg_parameters, plain_coordinates
+from rrru.kinematics.arrays import FloatArray
+from rrru.kinematics.robot import Robot
 from rrru.parameters import ParameterSet
 
 
-def for_robot(robot):
+def for_robot(robot: Robot) -> Effect | None:
     """The effect model for arms of two bars, None for robots without."""
     members = robot.parts.members
     if not members or any(len(group) != 2 for group in members):
@@ -31,7 +33,7 @@ def for_robot(robot):
     return Effect("bar_mismatch", parameters, plain_coordinates(parameters, 0.1), _apart)
 
 
-def _apart(motion, values):
+def _apart(motion: Motion, values: FloatArray) -> Contribution:
     """Shifts along the bars under differences (arms,) in mm."""
     first, second = zip(*motion.robot.parts.members, strict=True)
     bars = [(site,) for site in (*first, *second)]

@@ -22,13 +22,15 @@ assumed: a base drilled to 0.5 mm on a radius of 400 mm, that is about 1e-3 rad.
 
 import numpy as np
 
-from rrru.effects.protocol import Effect, leg_parameters, plain_coordinates
+from rrru.effects.protocol import Contribution, Effect, Motion, leg_parameters, plain_coordinates
+from rrru.kinematics.arrays import FloatArray
+from rrru.kinematics.robot import Robot
 from rrru.parameters import ParameterSet
 
 _KINDS = (("azimuth", "rad", -0.03, 0.03), ("radius", "mm", -30.0, 30.0), ("height", "mm", -30.0, 30.0))
 
 
-def for_robot(robot):
+def for_robot(robot: Robot) -> Effect | None:
     """The effect model for all legs with a foot on the base, None without such."""
     feet = robot.parts.feet
     if not feet:
@@ -39,7 +41,7 @@ def for_robot(robot):
     )
 
 
-def _placed(motion, values):
+def _placed(motion: Motion, values: FloatArray) -> Contribution:
     """Twists of the feet under azimuth (rad), radius and height (mm) of leg 1, then of the others, (3 legs,)."""
     shifts = {joint.name: joint.shift_mm for joint in motion.robot.legs.joints}
     drawn = np.array([shifts[site][0] for site in motion.robot.parts.feet])

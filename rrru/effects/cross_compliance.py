@@ -30,14 +30,17 @@ from itertools import combinations
 
 import numpy as np
 
-from rrru.effects.protocol import Effect, plain_coordinates
+from rrru.effects.protocol import Contribution, Effect, Motion, plain_coordinates
+from rrru.kinematics.arrays import FloatArray
+from rrru.kinematics.legs import Drive
+from rrru.kinematics.robot import Robot
 from rrru.parameters import Parameter, ParameterSet
 
 _SOURCE = "structure that joints of a trunk share, size assumed"
 _HIGHEST, _TYPICAL = 1e-6, 1e-8
 
 
-def for_robot(robot):
+def for_robot(robot: Robot) -> Effect | None:
     """The effect model for the turning joints of a trunk that several arms share, None for fewer than two joints."""
     springs = (*robot.parts.drives, *robot.parts.followers)
     chains = [{joint.name for joint in leg.joints} for leg in robot.legs.legs] if robot.legs.hands else []
@@ -48,7 +51,7 @@ def for_robot(robot):
         return None
     parameters = ParameterSet(tuple(_parameter(springs[a], springs[b]) for a, b in pairs))
 
-    def deflected(motion, values):
+    def deflected(motion: Motion, values: FloatArray) -> Contribution:
         """Changes of the values of drives and followers under cross compliances (pairs,) in rad/(N mm)."""
         load = np.concatenate([motion.drive_load, motion.follower_load], axis=1)
         changes, drives = np.zeros_like(load), len(robot.parts.drives)
@@ -60,7 +63,7 @@ def for_robot(robot):
     return Effect("cross_compliance", parameters, plain_coordinates(parameters, _TYPICAL), deflected, ("drive_load",))
 
 
-def _parameter(first, second):
+def _parameter(first: Drive, second: Drive) -> Parameter:
     """The parameter of a pair of springs, named by their sites."""
     name = "_".join(["cross", *(spring.site.replace(" ", "_") for spring in (first, second))])
     return Parameter(name, "rad/(N mm)", 0.0, -_HIGHEST, _HIGHEST, _SOURCE)

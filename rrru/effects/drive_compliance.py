@@ -30,11 +30,15 @@ Journal of Dynamic Systems, Measurement, and Control 109, 1987 (joint as a torsi
 on 50 kN m/rad make 3e-4 rad.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 
-from rrru.effects.link_weights import link_weights
-from rrru.effects.protocol import Effect, drive_parameters, of_drives, plain_coordinates
-from rrru.parameters import ParameterSet
+from rrru.effects.link_weights import LinkWeights, link_weights
+from rrru.effects.protocol import Contribution, Effect, Motion, drive_parameters, of_drives, plain_coordinates
+from rrru.kinematics.arrays import FloatArray
+from rrru.kinematics.robot import Robot
+from rrru.parameters import Parameter, ParameterSet
 
 _SOURCE = {
     "rad": "torsion spring; a small drive's 1 kN m/rad as bound",
@@ -44,7 +48,7 @@ _HIGHEST = {"rad": ("rad/(N mm)", 0.0, 1e-6), "mm": ("mm/N", 0.0, 0.05)}
 _TYPICAL = {"rad": 2e-8, "mm": 1e-3}
 
 
-def for_robot(robot):
+def for_robot(robot: Robot) -> Effect:
     """The effect model for all drives, and after them all joints that follow some."""
     springs = (*robot.parts.drives, *robot.parts.followers)
     own = drive_parameters(springs, _SOURCE, ("compliance", _HIGHEST))
@@ -56,14 +60,14 @@ def for_robot(robot):
     return Effect("drive_compliance", parameters, coordinates, _wind_up, ("drive_load",))
 
 
-def _wind_up(motion, values):
+def _wind_up(motion: Motion, values: FloatArray) -> Contribution:
     """Changes of the values of drives and followers under compliances (K + f,), rad/(N mm) or mm/N."""
     count = motion.drive_load.shape[1]
     followed = motion.at_followers(values[count:] * motion.follower_load)
     return motion.at_drives(values[:count] * motion.drive_load) + followed
 
 
-def _of_unknown_masses(compliances, weights):
+def _of_unknown_masses(compliances: Sequence[Parameter], weights: LinkWeights) -> Effect:
     """The effect model for an arm whose links have no stated masses."""
     parameters, typical, sizes = [], [], []
     for drive, compliance in enumerate(compliances):
@@ -72,12 +76,12 @@ def _of_unknown_masses(compliances, weights):
         typical += [_TYPICAL["rad"], *further_sizes]
         sizes.append(1 + len(further))
 
-    def functions(motion):
+    def functions(motion: Motion) -> list[FloatArray]:
         """By drive the deflections (n, 1 + c) under a unit of its compliance and of each parameter of weight."""
         each = zip(motion.drive_load.T, weights.functions(motion), strict=True)
         return [np.column_stack([load, of_links]) for load, of_links in each]
 
-    def deflected(motion, values):
+    def deflected(motion: Motion, values: FloatArray) -> Contribution:
         """Changes of the drives' values under the parameters."""
         parts = zip(functions(motion), np.split(values, np.cumsum(sizes)[:-1]), strict=True)
         return motion.at_drives(np.stack([f @ own for f, own in parts], axis=1))

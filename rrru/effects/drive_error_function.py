@@ -25,16 +25,20 @@ Source: MacKay, Introduction to Gaussian processes, 1998 (periodic kernels). The
 1e-4 rad, and a slide of ordinary precision is within 0.02 mm.
 """
 
+from collections.abc import Callable
+
 import numpy as np
 
 from rrru.effects.harmonic import waves
-from rrru.effects.protocol import Coordinates, Effect
+from rrru.effects.protocol import Contribution, Coordinates, Effect, Motion
+from rrru.kinematics.arrays import FloatArray
+from rrru.kinematics.robot import Robot
 from rrru.parameters import Parameter, ParameterSet
 
 ORDERS = np.arange(1, 129)
 # by the kind of a function its falling off with order / bend, its bends in waves per turn, its highest order, and
 # whether it is a fault of one drive
-_SPECTRA = (
+_SPECTRA: tuple[tuple[Callable[[FloatArray], FloatArray], tuple[float, ...], int, bool], ...] = (
     # with steps, which high orders make: ASSUME no robot has several scales that are joined with an offset
     (lambda at: (1.0 + at**2) ** -0.5, (3.0, 12.0, 48.0), 128, True),
     # with corners
@@ -46,7 +50,7 @@ _TYPICAL, _MOST = {"rad": 1e-4, "mm": 0.02}, {"rad": 0.01, "mm": 2.0}
 _STROKE_MM = 1000.0
 
 
-def for_robot(robot):
+def for_robot(robot: Robot) -> Effect:
     """The effect model for all drives."""
     units = robot.parts.units
     parameters = ParameterSet(
@@ -75,11 +79,11 @@ def for_robot(robot):
         broad=True,
     )
 
-    def functions(motion):
+    def functions(motion: Motion) -> list[FloatArray]:
         """By drive the functions (n, 2 orders) of its value that a unit of each of its coordinates adds."""
         return [waves(angle, ORDERS) for angle in (motion.drive * per_unit).T]
 
-    def err(motion, values):
+    def err(motion: Motion, values: FloatArray) -> Contribution:
         """Changes of the actuator values under coefficients (K times 2 orders,) in their units."""
         by_drive = np.reshape(values, (len(units), -1))
         return motion.at_drives(np.stack([f @ c for f, c in zip(functions(motion), by_drive, strict=True)], axis=1))
@@ -87,7 +91,7 @@ def for_robot(robot):
     return Effect("drive_error_function", parameters, coordinates, err, along_drives=functions, of_drive_value=True)
 
 
-def _per_unit(robot):
+def _per_unit(robot: Robot) -> FloatArray:
     """Angle (K,) of the lowest wave per drive value: 1 for drives that turn, in rad per mm for those that slide."""
     strokes = np.where(np.isfinite(robot.strokes), robot.strokes, _STROKE_MM)
     return np.where(np.array(robot.parts.units) == "rad", 1.0, np.pi / strokes)

@@ -20,10 +20,12 @@ assumed: 10 um off at a grating radius of 20 mm make 5e-4 rad.
 """
 
 from rrru.effects.harmonic import of_encoders
+from rrru.effects.protocol import Effect
+from rrru.kinematics.robot import Robot
 
 _SOURCE = "eccentricity over grating radius; up to some arc minutes, assumed"
 
 
-def for_robot(robot):
+def for_robot(robot: Robot) -> Effect | None:
     """The effect model for the drives that turn, None for robots without any."""
     return of_encoders(robot, "encoder_eccentricity", 1.0, _SOURCE, 3e-4)

@@ -22,10 +22,12 @@ encoders, CIRP Annals 59, 2010, on harmonics of encoders. The size is assumed: a
 """
 
 from rrru.effects.harmonic import of_encoders
+from rrru.effects.protocol import Effect
+from rrru.kinematics.robot import Robot
 
 _SOURCE = "difference of diameters over four of them, or tilt squared over four, assumed"
 
 
-def for_robot(robot):
+def for_robot(robot: Robot) -> Effect | None:
     """The effect model for the drives that turn, None for robots without any."""
     return of_encoders(robot, "encoder_ovality", 2.0, _SOURCE, 2e-4)

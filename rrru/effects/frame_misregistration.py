@@ -21,8 +21,10 @@ Transactions on Pattern Analysis and Machine Intelligence 9, 1987. Sizes assumed
 
 import numpy as np
 
-from rrru.effects.protocol import Effect, plain_coordinates
+from rrru.effects.protocol import Contribution, Effect, Motion, plain_coordinates
+from rrru.kinematics.arrays import FloatArray
 from rrru.kinematics.legs import WORLD
+from rrru.kinematics.robot import Robot
 from rrru.parameters import Parameter, ParameterSet
 
 _KINDS = (("shift", "mm", 100.0), ("turn", "rad", 0.1))
@@ -36,11 +38,11 @@ _PARAMETERS = ParameterSet(
 _COORDINATES = plain_coordinates(_PARAMETERS, np.repeat([0.5, 5e-4], 3))
 
 
-def _moved(motion, values):
+def _moved(motion: Motion, values: FloatArray) -> Contribution:
     """The world's twist by the frame's shift (mm) and rotation vector (rad), (6,)."""
     return motion.at({WORLD: values[None]})
 
 
-def for_robot(_robot):
+def for_robot(_robot: Robot) -> Effect:
     """The effect model, the same for every robot."""
     return Effect("frame_misregistration", _PARAMETERS, _COORDINATES, _moved)

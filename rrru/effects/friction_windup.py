@@ -27,10 +27,12 @@ transmissions, IEEE International Conference on Robotics and Automation, 1995, o
 assumed: as large as the backlash of a worn drive, over some degrees or millimetres.
 """
 
-import numba
 import numpy as np
 
-from rrru.effects.protocol import PATH, Effect, drive_parameters, of_drives, plain_coordinates
+from rrru.effects.protocol import PATH, Contribution, Effect, Motion, drive_parameters, of_drives, plain_coordinates
+from rrru.kinematics.arrays import FloatArray
+from rrru.kinematics.robot import Robot
+from rrru.kinematics.typed_numba import njit
 from rrru.parameters import Parameter, ParameterSet
 
 _SOURCE = dict.fromkeys(("rad", "mm"), "Coulomb friction over stiffness, size assumed")
@@ -44,8 +46,8 @@ _TRAVEL = {
 _TRAVEL_SHARES = (0.5, 2.0)
 
 
-@numba.njit(cache=True)
-def wound(path, travel):
+@njit(cache=True)
+def wound(path: FloatArray, travel: FloatArray) -> FloatArray:
     """Share (N, k) of the friction that has built up, -1 to 1, along a path (N, k) with travels (k,), same unit."""
     result = np.empty_like(path)
     for leg in range(path.shape[1]):
@@ -61,7 +63,7 @@ def wound(path, travel):
     return result
 
 
-def for_robot(robot):
+def for_robot(robot: Robot) -> Effect:
     """The effect model for all drives."""
     drives, units = robot.parts.drives, robot.parts.units
     travels = {unit: _TRAVEL[unit] for unit in dict.fromkeys(units)}
@@ -70,7 +72,7 @@ def for_robot(robot):
     shapes = tuple({travel.name: share * travel.nominal for travel in travels.values()} for share in _TRAVEL_SHARES)
     which = [list(travels).index(unit) for unit in units]
 
-    def wound_up(motion, values):
+    def wound_up(motion: Motion, values: FloatArray) -> Contribution:
         """Changes of the actuator values under amplitudes (K,) and travels in their units."""
         travel = values[len(drives) :][which]
         share = wound(np.ascontiguousarray(motion.path_drive), travel)[motion.path_index]

@@ -3,18 +3,24 @@
 They act at the drives of one unit. In a robot with turning and sliding drives these are not all of them.
 """
 
+from collections.abc import Mapping
+
 import numpy as np
 
-from rrru.effects.protocol import Coordinates, Effect, leg_parameters
-from rrru.parameters import ParameterSet
+from rrru.effects.protocol import Contribution, Coordinates, Effect, Motion, leg_parameters
+from rrru.kinematics.arrays import FloatArray, IntArray
+from rrru.kinematics.robot import Robot
+from rrru.parameters import Parameter, ParameterSet
 
 
-def drives_of(robot, unit):
+def drives_of(robot: Robot, unit: str) -> IntArray:
     """Numbers (k,) from 0 on of a robot's drives of a unit, "rad" or "mm"."""
     return np.flatnonzero([drive_unit == unit for drive_unit in robot.parts.units])
 
 
-def harmonic_parameters(drives, source, unit="rad", highest=0.01):
+def harmonic_parameters(
+    drives: IntArray, source: str, unit: str = "rad", highest: float = 0.01
+) -> tuple[Parameter, ...]:
     """Amplitudes in the unit and phases in rad of drives (k,), numbered from 0 on, as a tuple of 2 k parameters."""
     count = drives.max() + 1
     amplitudes = leg_parameters(source, ("amplitude", unit, 0.0, highest), count=count)
@@ -22,7 +28,7 @@ def harmonic_parameters(drives, source, unit="rad", highest=0.01):
     return tuple(parameter for parameter in (*amplitudes, *phases) if parameter.leg - 1 in drives)
 
 
-def at_harmonic(motion, drives, periods, values):
+def at_harmonic(motion: Motion, drives: IntArray, periods: float, values: FloatArray) -> Contribution:
     """Contribution of errors a_i sin(N theta_i + p_i) of drives (k,); values: amplitudes, phases; N periods a turn."""
     count, change = len(drives), np.zeros_like(motion.drive)
     wave = np.sin(periods * motion.drive[:, drives] + values[count : 2 * count])
@@ -30,7 +36,9 @@ def at_harmonic(motion, drives, periods, values):
     return motion.at_drives(change)
 
 
-def harmonic_coordinates(parameters, typical, shapes=({},)):
+def harmonic_coordinates(
+    parameters: ParameterSet, typical: float, shapes: tuple[Mapping[str, float], ...] = ({},)
+) -> Coordinates:
     """Coordinates sine1, cosine1, sine2, ... in the drive's unit: the error is s_i sin(N q_i) + c_i cos(N q_i).
 
     parameters: those of `harmonic_parameters` first, after them those of the shapes.
@@ -38,7 +46,7 @@ def harmonic_coordinates(parameters, typical, shapes=({},)):
     names = [name for name in parameters.names if name not in shapes[0]]
     drives = [parameters[name].leg for name in names[: len(names) // 2]]
 
-    def to_values(coordinates, shape):
+    def to_values(coordinates: FloatArray, shape: Mapping[str, float]) -> FloatArray:
         sine, cosine = np.reshape(coordinates, (-1, 2)).T
         values = np.concatenate([np.hypot(sine, cosine), np.arctan2(cosine, sine)])
         return parameters.vector(dict(shape) | dict(zip(names, values, strict=True)))
@@ -53,20 +61,21 @@ def harmonic_coordinates(parameters, typical, shapes=({},)):
     )
 
 
-def of_encoders(robot, name, periods, source, typical_rad):
+def of_encoders(robot: Robot, name: str, periods: float, source: str, typical_rad: float) -> Effect | None:
     """Effect of errors with `periods` waves per turn of every turning drive, None for robots without any."""
     turning = drives_of(robot, "rad")
     if not len(turning):
         return None
     parameters = ParameterSet(harmonic_parameters(turning, source))
 
-    def harmonic_error(motion, values):
+    def harmonic_error(motion: Motion, values: FloatArray) -> Contribution:
         return at_harmonic(motion, turning, periods, values)
 
     coordinates = harmonic_coordinates(parameters, typical_rad)
     return Effect(name, parameters, coordinates, harmonic_error, of_drive_value=True)
 
 
-def waves(angle, orders):
+def waves(angle: FloatArray, orders: FloatArray | IntArray) -> FloatArray:
     """Sine and cosine in turn, (n, 2 orders), of orders (k,) times an angle (n,)."""
-    return np.stack([np.sin(np.outer(angle, orders)), np.cos(np.outer(angle, orders))], axis=2).reshape(len(angle), -1)
+    phase = np.outer(angle, orders)
+    return np.stack([np.sin(phase), np.cos(phase)], axis=2).reshape(len(angle), -1)

@@ -16,14 +16,17 @@ Fundamentals of Manipulator Calibration, 1991). Typical sizes assumed: 0.1 mm an
 
 import numpy as np
 
-from rrru.effects.protocol import Effect, plain_coordinates
+from rrru.effects.protocol import Contribution, Effect, Motion, plain_coordinates
+from rrru.kinematics.arrays import FloatArray
+from rrru.kinematics.legs import Joint
+from rrru.kinematics.robot import Robot
 from rrru.parameters import Parameter, ParameterSet
 
 _SOURCE = "drilling and fit of joints, size assumed"
 _BOUNDS, _TYPICAL = {"mm": 5.0, "rad": 0.03}, {"mm": 0.1, "rad": 5e-4}
 
 
-def for_robot(robot):
+def for_robot(robot: Robot) -> Effect | None:
     """The effect model for all joints that move, None for a robot of bars alone or on rails (there `rail_tilt`)."""
     moving = [joint for joint in robot.legs.joints if joint.kind != "fixed"]
     if not moving or (robot.parts.feet and all(joint.kind == "P" for joint in moving)):
@@ -31,9 +34,9 @@ def for_robot(robot):
     placed = [(joint.name, twist) for joint in moving for twist in _across(joint)]
     parameters = ParameterSet(tuple(_parameter(site, twist) for site, twist in placed))
 
-    def seated(motion, values):
+    def seated(motion: Motion, values: FloatArray) -> Contribution:
         """The twists of the seats under all shifts and tilts."""
-        twists = {}
+        twists: dict[str, FloatArray] = {}
         for (site, twist), value in zip(placed, values, strict=True):
             twists[site] = twists.get(site, 0.0) + value * twist[None]
         return motion.at(twists)
@@ -42,7 +45,7 @@ def for_robot(robot):
     return Effect("joint_axis_error", parameters, plain_coordinates(parameters, typical), seated)
 
 
-def _across(joint):
+def _across(joint: Joint) -> tuple[FloatArray, ...]:
     """Unit twists (6,) across the axis of a joint: two shifts, none for a slide, and two tilts."""
     first = np.cross(joint.axis, np.eye(3)[np.abs(joint.axis).argmin()])
     first = first / np.linalg.norm(first)
@@ -51,7 +54,7 @@ def _across(joint):
     return (*shifts, *(np.concatenate([np.zeros(3), one]) for one in across))
 
 
-def _parameter(site, twist):
+def _parameter(site: str, twist: FloatArray) -> Parameter:
     """The parameter of one shift or tilt of a seat, named by the largest of its components."""
     largest = int(np.abs(twist).argmax())
     unit, axis = ("mm" if largest < 3 else "rad"), "xyz"[largest % 3]

@@ -23,33 +23,35 @@ Paper A, section 3.3, names it as the cause of the error after calibration; its 
 
 import numpy as np
 
-from rrru.effects.protocol import Effect, leg_parameters, plain_coordinates
+from rrru.effects.link_flexure import HELD, held_shares, member_force
+from rrru.effects.protocol import Contribution, Effect, Motion, leg_parameters, plain_coordinates
+from rrru.kinematics.arrays import FloatArray
+from rrru.kinematics.robot import Robot
 from rrru.parameters import Parameter, ParameterSet
 
 _SIZE = ("clearance", "mm", 0.0, 2.0)
 _SHAPE = (
     Parameter("transition", "N", 0.0, 0.0, 100.0, "force within which the contact changes sides, assumed"),
-    Parameter("held", "1", 0.0, 0.0, 1.0, "0 where joint 3 is free, 1 where friction holds it"),
+    HELD,
 )
 
 
-def for_robot(robot):
+def for_robot(robot: Robot) -> Effect | None:
     """The effect model for robots whose platform is pushed by links, None for others."""
     members = robot.parts.members
     if not members:
         return None
     sizes = leg_parameters("paper A, section 3.3 blames it; size assumed", _SIZE, count=len(members))
-    # a joint within the leg may be held
-    held = (0.0, 1.0) if robot.parts.held_from else (0.0,)
-    shapes = tuple({"transition": force, "held": share} for share in held for force in (0.2, 0.7, 2.0))
+    shares = held_shares(robot)
+    shapes = tuple({"transition": force, HELD.name: share} for share in shares for force in (0.2, 0.7, 2.0))
     parameters = ParameterSet((*sizes, *_SHAPE))
     coordinates = plain_coordinates(parameters, 0.05, shapes)
     return Effect("joint_clearance", parameters, coordinates, _sides, ("force_n",), switches=True)
 
 
-def _sides(motion, values):
+def _sides(motion: Motion, values: FloatArray) -> Contribution:
     """Shifts along the members under clearances (members,) in mm, the transition in N and the share held."""
     *clearance, transition, held = values
-    force = motion.force_n + held * (motion.held_force_n - motion.force_n)
+    force = member_force(motion, held)
     side = np.tanh(force / transition) if transition > 0.0 else np.sign(force)
     return motion.along(motion.robot.parts.members, -side * clearance)

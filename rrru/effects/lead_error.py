@@ -18,13 +18,15 @@ Source: ISO 230-2, mean bidirectional positional deviation; ISO 3408-3, travel d
 import numpy as np
 
 from rrru.effects.harmonic import drives_of
-from rrru.effects.protocol import Effect, leg_parameters, plain_coordinates
+from rrru.effects.protocol import Contribution, Effect, Motion, leg_parameters, plain_coordinates
+from rrru.kinematics.arrays import FloatArray
+from rrru.kinematics.robot import Robot
 from rrru.parameters import ParameterSet
 
 _TYPICAL, _MOST, _SOURCE = 2e-4, 1e-2, "ISO 3408-3, grades 5 to 10: 8e-5 to 7e-4"
 
 
-def for_robot(robot):
+def for_robot(robot: Robot) -> Effect | None:
     """The effect of all drives that slide, None where none does."""
     sliding = drives_of(robot, "mm")
     if not len(sliding):
@@ -32,7 +34,7 @@ def for_robot(robot):
     every = leg_parameters(_SOURCE, ("lead_error", "1", -_MOST, _MOST), count=int(sliding.max()) + 1)
     parameters = ParameterSet(tuple(parameter for parameter in every if parameter.leg - 1 in sliding))
 
-    def scaled(motion, values):
+    def scaled(motion: Motion, values: FloatArray) -> Contribution:
         """Changes of the actuator values under shares (k,) of the slides."""
         change = np.zeros(motion.drive.shape)
         change[:, sliding] = values * motion.drive[:, sliding]

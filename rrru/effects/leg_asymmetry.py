@@ -20,13 +20,15 @@ Source: paper A, section 2.2 (the 14 errors); the bounds are those of its calibr
 workshop holds on welded or clamped links of this length, ISO 2768-1 class m (+-0.8 mm from 400 to 1000 mm).
 """
 
-from rrru.effects.protocol import Effect, leg_parameters, plain_coordinates
+from rrru.effects.protocol import Contribution, Effect, Motion, leg_parameters, plain_coordinates
+from rrru.kinematics.arrays import FloatArray
+from rrru.kinematics.robot import Robot
 from rrru.parameters import ParameterSet
 
 _SOURCE = "paper A, section 2.2, and workshop tolerance; bounds assumed"
 
 
-def for_robot(robot):
+def for_robot(robot: Robot) -> Effect | None:
     """The effect model for robots whose legs have links, None for others."""
     links = robot.parts.links
     if not links:
@@ -35,7 +37,7 @@ def for_robot(robot):
     kinds = ((name, "mm", -4.0, 4.0) for name in links)
     parameters = ParameterSet(leg_parameters(_SOURCE, *kinds, count=len(groups) // len(links)))
 
-    def lengths(motion, values):
+    def lengths(motion: Motion, values: FloatArray) -> Contribution:
         """Shifts along the links under dL of the links of leg 1, then of the others, in mm."""
         return motion.along(groups, values[None])
 

@@ -5,15 +5,20 @@ A file of the library has a function `for_robot`, from a robot to its Effect, No
 
 import importlib
 import pkgutil
+from collections.abc import Callable, Mapping
 from dataclasses import fields
 from difflib import get_close_matches
 from functools import partial
 from pathlib import Path
+from types import ModuleType
+from typing import Any
 
 import numpy as np
 
-from rrru.effects.protocol import ActiveEffect, Contribution, Effect, Motion, plain_coordinates
+from rrru.effects.protocol import ActiveEffect, Contribution, Coordinates, Effect, Motion, plain_coordinates
 from rrru.errors import ConfigError
+from rrru.kinematics.arrays import FloatArray
+from rrru.kinematics.robot import Robot
 from rrru.parameters import ParameterSet
 from rrru.plugins import load_object
 
@@ -34,16 +39,22 @@ _NEEDS = tuple(one.name for one in fields(Motion) if one.name not in ("robot", "
 _TYPICAL_SHARE = 0.1
 
 
-def _names():
+def _names() -> tuple[str, ...]:
     """Names of the folder's effects in their order."""
     files = {info.name for info in pkgutil.iter_modules([str(Path(__file__).parent)])}
     names = {name for name in files - {Path(__file__).stem} if hasattr(_module(name), "for_robot")}
     return *(name for name in _ORDER if name in names), *sorted(names.difference(_ORDER))
 
 
-def _module(name):
+def _module(name: str) -> ModuleType:
     """The module of one file of the folder."""
     return importlib.import_module(f"rrru.effects.{name}")
+
+
+def _made(name: str, robot: Robot) -> Effect | None:
+    """The effect of one file of the folder on a robot, None where the robot has no site for it."""
+    effect: Effect | None = _module(name).for_robot(robot)
+    return effect
 
 
 NAMES = _names()
@@ -57,13 +68,13 @@ HOLDS = {
 }
 
 
-def library(robot):
+def library(robot: Robot) -> dict[str, Effect]:
     """The library's effects that a robot may have, by name."""
-    made = {name: _module(name).for_robot(robot) for name in NAMES}
+    made = {name: _made(name, robot) for name in NAMES}
     return {name: effect for name, effect in made.items() if effect is not None}
 
 
-def find(name, robot):
+def find(name: str, robot: Robot) -> Effect | None:
     """The effect on a robot of a library name or of `module:object`, an effect or a class without arguments.
 
     The module lies in the working directory or is installed. None for a library's effect that the robot cannot have.
@@ -73,7 +84,7 @@ def find(name, robot):
     where it is incomplete.
     """
     if name in NAMES:
-        return _module(name).for_robot(robot)
+        return _made(name, robot)
     module_name, colon, object_name = name.partition(":")
     if not (colon and object_name and all(part.isidentifier() for part in module_name.split("."))):
         near = get_close_matches(name, NAMES, n=1)
@@ -82,7 +93,7 @@ def find(name, robot):
     return _complete(name, _load(name))
 
 
-def active_effects(section, robot):
+def active_effects(section: Mapping[str, Mapping[str, float]] | None, robot: Robot) -> tuple[ActiveEffect, ...]:
     """Effects of a robot with their values from a mapping {effect: {parameter: value}}.
 
     Raises ConfigError for unknown names and for values out of bounds.
@@ -101,7 +112,7 @@ def active_effects(section, robot):
     return tuple(result)
 
 
-def _load(name):
+def _load(name: str) -> Any:
     """The object named by `module:object`, an instance where it is a class."""
     named = load_object(f"effect {name!r}", name)
     if not isinstance(named, type):
@@ -113,7 +124,7 @@ def _load(name):
         raise ConfigError(f"effect {name!r}: cannot make one: {error}; allowed: {allowed}") from error
 
 
-def _complete(name, users):
+def _complete(name: str, users: Any) -> Effect:
     """The user's effect with its contributions checked and with defaults for what it may leave out."""
     missing = [part for part in ("name", "parameters", "contribute") if not hasattr(users, part)]
     if missing:
@@ -132,7 +143,7 @@ def _complete(name, users):
     return Effect(users.name, users.parameters, coordinates, checked, tuple(needs))
 
 
-def _check_name(name, own):
+def _check_name(name: str, own: str) -> None:
     """Raise ConfigError where a user's effect has a name that tables and settings cannot hold."""
     if own in NAMES:
         raise ConfigError(f"effect {name!r}: its name {own!r} belongs to the library; allowed: another one")
@@ -143,7 +154,9 @@ def _check_name(name, own):
         raise ConfigError(f"effect {name!r}: its name is {own!r}; allowed: letters, digits and _, such as my_effect")
 
 
-def _checked(name, contribute, motion, values):
+def _checked(
+    name: str, contribute: Callable[[Motion, FloatArray], Contribution], motion: Motion, values: FloatArray
+) -> Contribution:
     """A user's contribution in full shape; raises ConfigError where it fails or does not fit."""
     try:
         result = contribute(motion, values)
@@ -159,7 +172,7 @@ def _checked(name, contribute, motion, values):
         raise ConfigError(f"effect {name!r}: its twists have the shape {given}; allowed: {shape}") from error
 
 
-def _default_coordinates(name, parameters):
+def _default_coordinates(name: str, parameters: ParameterSet) -> Coordinates:
     """Plain coordinates with a share of the bounds' width as typical sizes."""
     width = parameters.high - parameters.low
     for parameter in np.array(parameters.names)[~np.isfinite(width)]:

@@ -34,16 +34,18 @@ identification using local models applied to industrial robots, Automatica 47, 2
 
 import numpy as np
 
-from rrru.effects.protocol import Effect, leg_parameters, plain_coordinates
+from rrru.effects.protocol import Contribution, Effect, Motion, leg_parameters, plain_coordinates
+from rrru.kinematics.arrays import FloatArray
 from rrru.kinematics.legs import unit_twist
+from rrru.kinematics.robot import Robot
 from rrru.parameters import Parameter, ParameterSet
 
 _SIZE = ("flexure", "mm/N", 0.0, 0.1)
 _BEND = ("bending", "rad/(N mm)", 0.0, 1e-6)
-_HELD = Parameter("held", "1", 0.0, 0.0, 1.0, "0 where joint 3 is free, 1 where friction holds it")
+HELD = Parameter("held", "1", 0.0, 0.0, 1.0, "0 where joint 3 is free, 1 where friction holds it")
 
 
-def for_robot(robot):
+def for_robot(robot: Robot) -> Effect | None:
     """The effect model for robots whose platform is pushed by links, and for arms; None for others."""
     members = robot.parts.members
     if not members:
@@ -51,13 +53,22 @@ def for_robot(robot):
     if all(_driven(robot, member) for member in members):
         return None
     sizes = leg_parameters("axial spring of forearm and its joints, size assumed", _SIZE, count=len(members))
-    # a joint within the leg may be held
-    shapes = ({"held": 0.0}, {"held": 1.0}) if robot.parts.held_from else ({"held": 0.0},)
-    parameters = ParameterSet((*sizes, _HELD))
+    shapes = tuple({HELD.name: share} for share in held_shares(robot))
+    parameters = ParameterSet((*sizes, HELD))
     return Effect("link_flexure", parameters, plain_coordinates(parameters, 2e-3, shapes), _shortened, ("force_n",))
 
 
-def _driven(robot, member):
+def held_shares(robot: Robot) -> tuple[float, ...]:
+    """Shares to which friction may hold joint 3: none, and wholly where a joint within the leg may be held."""
+    return (0.0, 1.0) if robot.parts.held_from else (0.0,)
+
+
+def member_force(motion: Motion, held: float) -> FloatArray:
+    """Forces (n, members) in N with which members push the platform, joint 3 being held to a share."""
+    return motion.force_n + held * (motion.held_force_n - motion.force_n)
+
+
+def _driven(robot: Robot, member: tuple[str, ...]) -> bool:
     """Whether a drive only lengthens a member of these sites."""
     nothing = np.zeros(6)
     lengthened = {site: unit_twist(0) for site in member}
@@ -67,13 +78,12 @@ def _driven(robot, member):
     )
 
 
-def _shortened(motion, values):
+def _shortened(motion: Motion, values: FloatArray) -> Contribution:
     """Shifts along the members under compliances (members,) in mm/N and the share to which joint 3 is held."""
-    force = motion.force_n + values[-1] * (motion.held_force_n - motion.force_n)
-    return motion.along(motion.robot.parts.members, -values[:-1] * force)
+    return motion.along(motion.robot.parts.members, -values[:-1] * member_force(motion, values[-1]))
 
 
-def _across_joints(joints):
+def _across_joints(joints: tuple[str, ...]) -> Effect | None:
     """The effect model for an arm with these turning joints, None where there are none."""
     if not joints:
         return None
@@ -81,7 +91,7 @@ def _across_joints(joints):
         leg_parameters("bearing and link across the axis, size assumed", _BEND, count=len(joints))
     )
 
-    def tilted(motion, values):
+    def tilted(motion: Motion, values: FloatArray) -> Contribution:
         """Turns across the joints' axes under compliances (J,) in rad/(N mm)."""
         turns = values[:, None] * motion.across
         twists = np.concatenate([np.zeros_like(turns), turns], axis=2)

@@ -15,14 +15,17 @@ Source: as `thermal_growth`; Mayr et al., Thermal issues in machine tools, CIRP 
 
 import numpy as np
 
-from rrru.effects.protocol import Contribution, Effect, plain_coordinates
+from rrru.effects.protocol import Contribution, Effect, Motion, plain_coordinates
 from rrru.effects.thermal_growth import SHAPES, TIME_CONSTANT, lengths, warmth
+from rrru.kinematics.arrays import FloatArray
+from rrru.kinematics.legs import Legs
+from rrru.kinematics.robot import Robot
 from rrru.parameters import Parameter, ParameterSet
 
 _TYPICAL, _MOST, _SOURCE = 2e-4, 1e-2, "aluminium 2.3e-5 per kelvin; temperature assumed"
 
 
-def for_robot(robot):
+def for_robot(robot: Robot) -> Effect | None:
     """The effect model for an arm with two links or more that each follow a drive of their own, None for others."""
     legs = robot.legs
     if len(legs.legs) != 1 or not legs.arm_joints or legs.coupling is not None:
@@ -34,7 +37,7 @@ def for_robot(robot):
         (*(Parameter(f"strain{k}", "1", 0.0, 0.0, _MOST, _SOURCE, k) for k in links), TIME_CONSTANT)
     )
 
-    def grown(motion, values):
+    def grown(motion: Motion, values: FloatArray) -> Contribution:
         """Shifts of the links' ends by their growth under the strains and the time constant in s."""
         *strains, time_constant = values
         longer = sum(strain * links[k] for k, strain in zip(links, strains, strict=True))
@@ -43,9 +46,10 @@ def for_robot(robot):
     return Effect("link_growth", parameters, plain_coordinates(parameters, _TYPICAL, SHAPES), grown, ("time_s",))
 
 
-def _links(legs):
+def _links(legs: Legs) -> dict[int, FloatArray]:
     """Twists (sites, 6) that make all lengths of a link longer by their own size, by number of the drive from 1 on."""
-    (leg,), every, result, drive = legs.legs, lengths(legs), {}, None
+    (leg,), every, drive = legs.legs, lengths(legs), None
+    result: dict[int, FloatArray] = {}
     for joint in leg.joints:
         site = legs.site_numbers[joint.name]
         if drive is not None and every[site].any():

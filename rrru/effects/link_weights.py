@@ -16,11 +16,16 @@ Source: gravity in base inertial parameters: Khalil and Dombre, Modeling, Identi
 chapter 9. The size is assumed: 1 kg per 40 mm of link on 50 kN m/rad.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import qr
 
+from rrru.effects.protocol import Motion
+from rrru.kinematics.arrays import FloatArray, IntArray
+from rrru.kinematics.parameter_jacobian import TwistMap
+from rrru.kinematics.robot import Robot
 from rrru.parameters import Parameter
 
 _KG_PER_MM, _GRAVITY, _COMPLIANCE = 1.0 / 40.0, 9.81, 2e-8
@@ -39,12 +44,12 @@ class LinkWeights:
     its joint; moments (K,): assumed moments of the links in kg mm.
     """
 
-    robot: object
-    joints: list
-    columns: list
-    moments: np.ndarray
+    robot: Robot
+    joints: list[int]
+    columns: list[IntArray]
+    moments: FloatArray
 
-    def parameters(self, drive):
+    def parameters(self, drive: int) -> tuple[list[Parameter], FloatArray]:
         """Parameters of a drive, counted from 0, and their typical sizes (c,) in rad."""
         named = [(drive + column // 3, "xyz"[column % 3]) for column in self.columns[drive]]
         parameters = [
@@ -55,22 +60,22 @@ class LinkWeights:
         ]
         return parameters, _COMPLIANCE * _GRAVITY * np.array([self.moments[link] for link, _ in named])
 
-    def functions(self, motion):
+    def functions(self, motion: Motion) -> list[FloatArray]:
         """By drive the deflections (n, c) under a unit of each of its parameters along a Motion."""
         at = self.robot.map_at(motion.drive, motion.position_mm)
         every = _columns(self.robot, at, self.joints)
         return [columns[:, own] for columns, own in zip(every, self.columns, strict=True)]
 
 
-def link_weights(robot):
+def link_weights(robot: Robot) -> LinkWeights | None:
     """The LinkWeights of an arm whose drives all turn and whose links have no stated masses, None for others."""
     legs = robot.legs
     alone = len(legs.legs) == 1 and legs.arm_joints and legs.coupling is None and not robot.point_masses
     if not alone or set(robot.parts.units) != {"rad"}:
         return None
     (leg,) = legs.legs
-    joints = {joint.drive: k for k, joint in enumerate(leg.joints) if joint.drive is not None}
-    joints = [joints[drive] for drive in range(len(joints))]
+    number = {joint.drive: k for k, joint in enumerate(leg.joints) if joint.drive is not None}
+    joints = [number[drive] for drive in range(len(number))]
     low, high = np.asarray(robot.drive_range, dtype=float).T
     # anywhere in the ranges, always the same poses
     drives = np.random.default_rng(0).uniform(low, high, (_POSES, len(low)))
@@ -79,7 +84,7 @@ def link_weights(robot):
     return LinkWeights(robot, joints, columns, _moments(robot, at, joints))
 
 
-def _frames(robot, at):
+def _frames(robot: Robot, at: TwistMap) -> tuple[FloatArray, FloatArray]:
     """Turns (J + 1, n, 3, 3) and places (J + 1, n, 3) of the leg's joints and of the platform."""
     (leg,) = robot.legs.legs
     frames = [at.frames[robot.legs.site_numbers[joint.name]] for joint in leg.joints]
@@ -87,7 +92,7 @@ def _frames(robot, at):
     return np.concatenate([turns, at.poses.turn[None]]), np.concatenate([places, at.poses.position_mm[None]])
 
 
-def _columns(robot, at, joints):
+def _columns(robot: Robot, at: TwistMap, joints: Sequence[int]) -> list[FloatArray]:
     """By drive the functions (n, 3 links): what each component of each link behind its joint adds to its value.
 
     The frame after a joint is fixed in its link; that of the joint itself does not turn with it.
@@ -103,18 +108,18 @@ def _columns(robot, at, joints):
     return result
 
 
-def _independent(columns):
+def _independent(columns: FloatArray) -> IntArray:
     """Numbers (c,) of columns that are not zero and that no others of them replace."""
     _, triangle, order = qr(columns, mode="economic", pivoting=True)
     size = np.abs(np.diag(triangle))
     return np.sort(order[: int((size > _NONE * np.sqrt(len(columns))).sum())])
 
 
-def _moments(robot, at, joints):
+def _moments(robot: Robot, at: TwistMap, joints: Sequence[int]) -> FloatArray:
     """Assumed moments (K,) in kg mm of each link and of all that hangs on its end."""
     _, places = _frames(robot, at)
     along = np.diff(places[[*joints, -1]], axis=0)
     length = np.maximum(np.median(np.linalg.norm(along, axis=2), axis=1), _LEAST_MM)
     mass = _KG_PER_MM * length
     behind = np.append(np.cumsum(mass[::-1])[::-1], 0.0)[1:]
-    return length * (0.5 * mass + behind)
+    return np.asarray(length * (0.5 * mass + behind))

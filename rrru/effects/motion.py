@@ -6,7 +6,11 @@ from functools import partial
 import numpy as np
 
 from rrru.effects.protocol import LOADS, Motion
-from rrru.kinematics.dynamics import drive_rates, load_slopes, loads
+from rrru.kinematics.arrays import FloatArray, IntArray
+from rrru.kinematics.chain import Poses
+from rrru.kinematics.dynamics import Masses, drive_rates, load_slopes, loads
+from rrru.kinematics.parameter_jacobian import TwistMap
+from rrru.kinematics.robot import Robot
 
 
 @dataclass(frozen=True)
@@ -20,21 +24,23 @@ class Course:
     `rrru.effects.protocol.Motion`.
     """
 
-    position_mm: np.ndarray
-    drive: np.ndarray
-    path_drive: np.ndarray
-    path_index: np.ndarray
-    time_s: np.ndarray
-    velocity_mm_s: np.ndarray
-    acceleration_mm_s2: np.ndarray
-    payload_kg: np.ndarray
-    drive_motion: tuple | None = None
+    position_mm: FloatArray
+    drive: FloatArray
+    path_drive: FloatArray
+    path_index: IntArray
+    time_s: FloatArray
+    velocity_mm_s: FloatArray
+    acceleration_mm_s2: FloatArray
+    payload_kg: FloatArray
+    drive_motion: tuple[FloatArray, FloatArray] | None = None
     stops: bool = False
-    temperature_c: np.ndarray | float = np.nan
-    approach: np.ndarray | float = np.nan
+    temperature_c: FloatArray | float = np.nan
+    approach: FloatArray | float = np.nan
 
 
-def make_motion(robot, masses, course, stands=None):
+def make_motion(
+    robot: Robot, masses: Masses, course: Course, stands: tuple[FloatArray, TwistMap] | None = None
+) -> Motion:
     """Motion along a Course: rates and loads of the nominal robot with `rrru.kinematics.dynamics.Masses`.
 
     Where the velocity is NaN the rates are; the loads then count the platform as at rest, and an unknown payload as
@@ -50,7 +56,7 @@ def make_motion(robot, masses, course, stands=None):
     # where the platform's orientation is free, only the commanded actuator values determine the pose
     nominal, carried = course.drive if robot.orients else robot.inverse(position), np.nan_to_num(payload)
     inertial = np.where(known, acceleration, 0.0)
-    turning = tuple(np.where(known, values, 0.0) for values in (rate, drive_acceleration))
+    turning = np.where(known, rate, 0.0), np.where(known, drive_acceleration, 0.0)
     nominal, at = stands or (nominal, robot.map_at(nominal, position))
     load = loads(robot, masses, at, nominal, turning, inertial, carried)
     return Motion(
@@ -71,7 +77,9 @@ def make_motion(robot, masses, course, stands=None):
     )
 
 
-def standing(robot, sent, posed, turned=True):
+def standing(
+    robot: Robot, sent: tuple[FloatArray, FloatArray], posed: tuple[Poses, FloatArray], turned: bool = True
+) -> tuple[FloatArray, TwistMap]:
     """Drive values (n, K) that bring the nominal robot next to where one stands, and its TwistMap there.
 
     sent: actuator values (n, K) and positions (n, 3); posed: Poses and the twists (n or 1, sites, 6) of all their
@@ -94,7 +102,7 @@ def standing(robot, sent, posed, turned=True):
     return actuators + step, robot.map_at(actuators + step, position + np.nan_to_num(shift))
 
 
-def last_move(drive, stop):
+def last_move(drive: FloatArray, stop: IntArray) -> FloatArray:
     """Travel of the drives (n, K) to each row's stop from the one before, NaN at the first; stop (n,) ascending."""
     values, number = np.asarray(drive, dtype=float), np.unique(stop, return_inverse=True)[1]
     at_stop = values[np.unique(number, return_index=True)[1]]

@@ -20,9 +20,11 @@ the sizes are assumed.
 
 import numpy as np
 
-from rrru.effects.protocol import Effect, plain_coordinates
+from rrru.effects.protocol import Contribution, Effect, Motion, plain_coordinates
+from rrru.kinematics.arrays import FloatArray
 from rrru.kinematics.dynamics import level_axes
 from rrru.kinematics.legs import WORLD
+from rrru.kinematics.robot import Robot
 from rrru.parameters import Parameter, ParameterSet
 
 _SOURCE = "bending of what the robot stands on, size assumed"
@@ -30,15 +32,15 @@ _KINDS = (("tilt", "rad/(N mm)", 0.0, 1e-7), ("shift", "mm/(N mm)", -1e-4, 1e-4)
 _TYPICAL = np.repeat([1e-9, 3e-7], 2)
 
 
-def for_robot(robot):
+def for_robot(robot: Robot) -> Effect:
     """The effect model, about the two axes of the robot's frame that are the most level."""
     axes = level_axes(robot)
     names = [(f"{kind}_{'xyz'[k]}", unit, low, high) for kind, unit, low, high in _KINDS for k in axes]
-    parameters = ParameterSet(tuple(Parameter(name, unit, 0.0, *ends, _SOURCE) for name, unit, *ends in names))
+    parameters = ParameterSet(tuple(Parameter(name, unit, 0.0, low, high, _SOURCE) for name, unit, low, high in names))
     about = np.eye(3)[axes]
     across = np.cross(about, robot.up)
 
-    def tilted(motion, values):
+    def tilted(motion: Motion, values: FloatArray) -> Contribution:
         """The world's twist under tilts (2,) and shifts (2,) per moment."""
         moment = motion.base_moment @ about.T
         return motion.at({WORLD: np.concatenate([moment * values[2:] @ across, moment * values[:2] @ about], axis=1)})

@@ -1,13 +1,17 @@
 """Effect models: functions of the motion that give the changes of the geometry and where they act. mm, rad, N, s."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
+from rrru.kinematics.arrays import BoolArray, FloatArray, IntArray
+from rrru.kinematics.dynamics import Loads
+from rrru.kinematics.legs import Drive
+from rrru.kinematics.robot import Robot
 from rrru.parameters import Parameter, ParameterSet
 
 _ALONG = np.array([1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
@@ -31,7 +35,7 @@ class Contribution:
     A twist is a shift in mm and a rotation vector in rad, in the site's own frame; see `rrru.kinematics.legs`.
     """
 
-    twists: np.ndarray | float = 0.0
+    twists: FloatArray | float = 0.0
 
     def __add__(self, other: "Contribution") -> "Contribution":
         return Contribution(self.twists + other.twists)
@@ -58,31 +62,31 @@ class Motion:
     approach (-1 from above, 1 from below, 0 for even odds), NaN where the path determines it.
     """
 
-    robot: Any
-    position_mm: np.ndarray
-    drive: np.ndarray
-    drive_rate: np.ndarray
-    drive_acceleration: np.ndarray
-    path_drive: np.ndarray
-    path_index: np.ndarray
-    time_s: np.ndarray
-    payload_kg: np.ndarray
-    force_n: np.ndarray
-    held_force_n: np.ndarray
-    drive_load: np.ndarray
-    follower_load: np.ndarray
-    across: np.ndarray
-    base_moment: np.ndarray
-    last_move: np.ndarray
-    temperature_c: np.ndarray
-    load_slopes: Callable[[], tuple[Any, ...]]
-    approach: np.ndarray | float = np.nan
+    robot: Robot
+    position_mm: FloatArray
+    drive: FloatArray
+    drive_rate: FloatArray
+    drive_acceleration: FloatArray
+    path_drive: FloatArray
+    path_index: IntArray
+    time_s: FloatArray
+    payload_kg: FloatArray
+    force_n: FloatArray
+    held_force_n: FloatArray
+    drive_load: FloatArray
+    follower_load: FloatArray
+    across: FloatArray
+    base_moment: FloatArray
+    last_move: FloatArray
+    temperature_c: FloatArray
+    load_slopes: Callable[[], tuple[Loads, ...]]
+    approach: FloatArray | float = np.nan
 
     def __len__(self) -> int:
         return len(self.drive)
 
     @cached_property
-    def slopes(self) -> tuple[Any, ...]:
+    def slopes(self) -> tuple[Loads, ...]:
         """The result of `load_slopes`, computed once."""
         return self.load_slopes()
 
@@ -103,22 +107,22 @@ class Motion:
         }
         return replace(self, **changed)
 
-    def with_approach(self, changes: np.ndarray, from_below: np.ndarray) -> np.ndarray:
+    def with_approach(self, changes: FloatArray, from_below: FloatArray) -> FloatArray:
         """Changes (n, K) of the actuator values with their expected values where the path does not determine them.
 
         from_below (K,): change of each drive that approaches from below; it has the other sign from above.
         """
         return np.where(np.isnan(self.approach), changes, self.approach * from_below)
 
-    def at_drives(self, changes: np.ndarray) -> Contribution:
+    def at_drives(self, changes: FloatArray) -> Contribution:
         """Contribution of changes (n, K) of the actuator values, in their units."""
         return self._at_values(self.robot.parts.drives, changes)
 
-    def at_followers(self, changes: np.ndarray) -> Contribution:
+    def at_followers(self, changes: FloatArray) -> Contribution:
         """Contribution of changes (n, f) of the joints that follow drives, in their units."""
         return self._at_values(self.robot.parts.followers, changes)
 
-    def _at_values(self, drives: Iterable[Any], changes: np.ndarray) -> Contribution:
+    def _at_values(self, drives: Iterable[Drive], changes: FloatArray) -> Contribution:
         """Contribution of changes (n, k) of the values of Drives."""
         numbers = self.robot.legs.site_numbers
         result = np.zeros((len(changes), len(numbers), 6))
@@ -129,17 +133,17 @@ class Motion:
                     result[:, numbers[site], number] += changes[:, k] * twist[number]
         return Contribution(result)
 
-    def along(self, groups: Iterable[tuple[str, ...]], shifts_mm: np.ndarray) -> Contribution:
+    def along(self, groups: Iterable[tuple[str, ...]], shifts_mm: FloatArray) -> Contribution:
         """Contribution of shifts (n or 1, groups) in mm along the x of every site of each group."""
         named = [(site, k) for k, group in enumerate(groups) for site in group]
         return self.at({site: np.multiply.outer(shifts_mm[:, k], _ALONG) for site, k in named})
 
-    def at_feet(self, turns_rad: np.ndarray, shifts_mm: np.ndarray | float = 0.0) -> Contribution:
+    def at_feet(self, turns_rad: FloatArray, shifts_mm: FloatArray | float = 0.0) -> Contribution:
         """Contribution of rotation vectors (legs, 3) and shifts (legs, 3) of the legs' feet."""
         twists = np.concatenate([np.zeros_like(turns_rad) + shifts_mm, turns_rad], axis=1)
         return self.at(dict(zip(self.robot.parts.feet, twists[:, None], strict=True)))
 
-    def at(self, twists: Mapping[str, np.ndarray]) -> Contribution:
+    def at(self, twists: Mapping[str, FloatArray]) -> Contribution:
         """Contribution of twists (n or 1, 6) by the site's name."""
         numbers = self.robot.legs.site_numbers
         rows = max((len(twist) for twist in twists.values()), default=1)
@@ -147,6 +151,9 @@ class Motion:
         for site, twist in twists.items():
             result[:, numbers[site]] += twist
         return Contribution(result)
+
+
+EffectModel = Callable[[Motion, FloatArray], Contribution]
 
 
 @dataclass(frozen=True)
@@ -182,21 +189,21 @@ class Coordinates:
     that was made outside of the fit.
     """
 
-    typical: np.ndarray
-    legs: np.ndarray
-    positive: np.ndarray
-    to_values: Callable[[np.ndarray, Mapping[str, float]], np.ndarray]
+    typical: FloatArray
+    legs: IntArray
+    positive: BoolArray
+    to_values: Callable[[FloatArray, Mapping[str, float]], FloatArray]
     shapes: tuple[Mapping[str, float], ...] = ({},)
     alike: bool = True
-    most: np.ndarray | float = np.inf
+    most: FloatArray | float = np.inf
     weights: tuple[float, ...] | None = None
     searched: Search | None = None
     stated: int = 0
     doubt: float = 0.3
     broad: bool = False
-    spectra: tuple[np.ndarray, ...] = ()
+    spectra: tuple[FloatArray, ...] = ()
     of_one: tuple[bool, ...] = ()
-    roots: tuple[tuple[np.ndarray, ...], ...] = ()
+    roots: tuple[tuple[FloatArray, ...], ...] = ()
     sized: bool = False
     log_prior: float = 0.0
 
@@ -215,7 +222,9 @@ def leg_parameters(source: str, *kinds: tuple[str, str, float, float], count: in
     )
 
 
-def drive_parameters(drives: Iterable[Any], source: Mapping[str, str], *kinds: tuple) -> tuple[Parameter, ...]:
+def drive_parameters(
+    drives: Iterable[Drive], source: Mapping[str, str], *kinds: tuple[str, Mapping[str, tuple[str, float, float]]]
+) -> tuple[Parameter, ...]:
     """Parameters of each Drive; kinds: (name, {drive's unit: (unit, low, high)}); source: by the drive's unit."""
     return tuple(
         Parameter(f"{name}{number}", unit, 0.0, low, high, source[drive.unit], number)
@@ -225,7 +234,7 @@ def drive_parameters(drives: Iterable[Any], source: Mapping[str, str], *kinds: t
     )
 
 
-def of_drives(drives: Iterable[Any], by_unit: Mapping[str, float]) -> np.ndarray:
+def of_drives(drives: Iterable[Drive], by_unit: Mapping[str, float]) -> FloatArray:
     """One number (K,) of each Drive by the drive's unit."""
     return np.array([by_unit[drive.unit] for drive in drives])
 
@@ -239,7 +248,7 @@ def plain_coordinates(
     """
     free = [p for p in parameters if p.name not in shapes[0]]
 
-    def to_values(coordinates: np.ndarray, shape: Mapping[str, float]) -> np.ndarray:
+    def to_values(coordinates: FloatArray, shape: Mapping[str, float]) -> FloatArray:
         return parameters.vector(dict(shape) | {p.name: value for p, value in zip(free, coordinates, strict=True)})
 
     return Coordinates(
@@ -250,6 +259,18 @@ def plain_coordinates(
         shapes=tuple(shapes),
         most=np.array([max(abs(p.low), abs(p.high)) for p in free]),
     )
+
+
+class Needing(Protocol):
+    """What needs fields of a Motion: an effect, or the discrepancy basis; see `Effect`."""
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """Fields of a Motion without which it contributes nothing."""
+
+    @property
+    def switches(self) -> bool:
+        """Whether it depends on the sign of a load alone."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -269,12 +290,12 @@ class Effect:
     name: str
     parameters: ParameterSet
     coordinates: Coordinates
-    effect_model: Callable[[Motion, np.ndarray], Contribution]
+    effect_model: EffectModel
     needs: tuple[str, ...] = ()
     spoils: str = ""
-    along_drives: Callable[[Motion], list[np.ndarray]] | None = None
+    along_drives: Callable[[Motion], list[FloatArray]] | None = None
     of_drive_value: bool = False
-    with_waves: Callable[..., "Effect"] | None = None
+    with_waves: Callable[[Sequence[tuple[int, float]], float], "Effect"] | None = None
     waves: tuple[tuple[int, float], ...] = ()
     switches: bool = False
 
@@ -296,25 +317,27 @@ class ActiveEffect:
     """An effect together with its parameter values by name; absent values are nominal."""
 
     effect: Effect
-    values: dict = field(default_factory=dict)
+    values: dict[str, float] = field(default_factory=dict)
 
     def contribute(self, motion: Motion) -> Contribution:
         """Changes at the points of a motion."""
         return self.effect.contribute(motion, self.effect.parameters.vector(self.values))
 
 
-def lacks_values(effect: Any, motion: Motion) -> np.ndarray:
+def lacks_values(effect: Needing, motion: Motion) -> BoolArray:
     """Rows (n,) at which a value that an effect, or the discrepancy basis, needs is NaN."""
     needs = [getattr(motion, need) for need in effect.needs if need != PATH]
-    return ~np.all([np.ones(len(motion), dtype=bool), *(known_values(values) for values in needs)], axis=0)
+    known: BoolArray = np.all([np.ones(len(motion), dtype=bool), *(known_values(values) for values in needs)], axis=0)
+    return ~known
 
 
-def known_values(values: np.ndarray) -> np.ndarray:
+def known_values(values: FloatArray) -> BoolArray:
     """Rows (n,) of values (n, ..) that are finite."""
-    return np.isfinite(values.reshape(len(values), -1)).all(axis=1)
+    known: BoolArray = np.all(np.isfinite(values.reshape(len(values), -1)), axis=1)
+    return known
 
 
-def complete_rows(effect: Any, motion: Motion) -> np.ndarray:
+def complete_rows(effect: Needing, motion: Motion) -> BoolArray:
     """Rows (n,) at which a motion has all that an effect needs, including the sense in which the drives approach."""
     result = ~lacks_values(effect, motion)
     if PATH in effect.needs:
@@ -322,12 +345,12 @@ def complete_rows(effect: Any, motion: Motion) -> np.ndarray:
     return result
 
 
-def bears_load(effect: Any) -> bool:
+def bears_load(effect: Needing) -> bool:
     """Whether an effect, or the discrepancy basis, depends on the loads."""
     return not LOADS.keys().isdisjoint(effect.needs)
 
 
-def is_compliance(effect: Any) -> bool:
+def is_compliance(effect: Effect) -> bool:
     """Whether an effect depends on the loads, or on weights that it has as parameters in their place."""
     return bears_load(effect) or any(is_per_load(parameter.unit) for parameter in effect.parameters)
 
@@ -337,7 +360,7 @@ def is_per_load(unit: str) -> bool:
     return "/N" in unit or "(N" in unit
 
 
-def is_compliant(effect: Any) -> bool:
+def is_compliant(effect: Needing) -> bool:
     """Whether an effect, or the discrepancy basis, grows with the loads, so that payload and tilt matter."""
     return bears_load(effect) and not effect.switches
 

@@ -19,13 +19,15 @@ assumed: 0.3 mm over 300 mm.
 
 import numpy as np
 
-from rrru.effects.protocol import Effect, leg_parameters, plain_coordinates
+from rrru.effects.protocol import Contribution, Effect, Motion, leg_parameters, plain_coordinates
+from rrru.kinematics.arrays import FloatArray
+from rrru.kinematics.robot import Robot
 from rrru.parameters import ParameterSet
 
 _TURNS = tuple((kind, "rad", -0.05, 0.05) for kind in ("lean", "rise", "swing"))
 
 
-def for_robot(robot):
+def for_robot(robot: Robot) -> Effect | None:
     """The effect model for legs whose drives slide on rails on the base, None without such."""
     feet = robot.parts.feet
     if not feet or "rad" in robot.parts.units:
@@ -34,6 +36,6 @@ def for_robot(robot):
     return Effect("rail_tilt", parameters, plain_coordinates(parameters, 1e-3), _seats)
 
 
-def _seats(motion, values):
+def _seats(motion: Motion, values: FloatArray) -> Contribution:
     """Twists of the rails' seats under lean, rise and swing of leg 1, then of the others, (3 legs,) in rad."""
     return motion.at_feet(np.reshape(values, (-1, 3)) * [1.0, -1.0, 1.0])

@@ -25,7 +25,9 @@ Modelling, Planning and Control, 2009, sections 4.2 and 8.3. Sizes assumed: 1 mr
 
 import numpy as np
 
-from rrru.effects.protocol import Effect, leg_parameters, plain_coordinates
+from rrru.effects.protocol import Contribution, Effect, Motion, leg_parameters, plain_coordinates
+from rrru.kinematics.arrays import FloatArray
+from rrru.kinematics.robot import Robot
 from rrru.parameters import Parameter, ParameterSet
 
 _SHARE = ("1", -0.05, 0.05)
@@ -40,7 +42,7 @@ _AS_LONG = {"rad": 1.0, "mm": 500.0}
 _SHORTEST = 1e-3
 
 
-def for_robot(robot):
+def for_robot(robot: Robot) -> Effect:
     """The effect model for all drives."""
     shares = leg_parameters(_SOURCE, ("share", *_SHARE), count=len(robot.parts.drives))
     parameters = ParameterSet((*shares, _EXPONENT))
@@ -49,7 +51,7 @@ def for_robot(robot):
     return Effect("read_before_rest", parameters, coordinates, _short, ("last_move",), _SPOILS)
 
 
-def _short(motion, values):
+def _short(motion: Motion, values: FloatArray) -> Contribution:
     """Changes of the actuator values under shares (K,) and an exponent."""
     units = np.array([_AS_LONG[unit] for unit in motion.robot.parts.units])
     move = np.nan_to_num(motion.last_move)

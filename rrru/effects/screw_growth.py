@@ -19,21 +19,23 @@ and Mass Transfer, lumped capacitance method (ch. 5). Sizes: steel has 1.2e-5 pe
 
 import numpy as np
 
-from rrru.effects.protocol import Effect, plain_coordinates
+from rrru.effects.protocol import Contribution, Effect, Motion, plain_coordinates
 from rrru.effects.thermal_growth import SHAPES, TIME_CONSTANT, warmth
+from rrru.kinematics.arrays import FloatArray
+from rrru.kinematics.robot import Robot
 from rrru.parameters import Parameter, ParameterSet
 
 _TYPICAL, _MOST, _SOURCE = 1e-4, 5e-3, "steel 1.2e-5 per kelvin; temperature assumed"
 
 
-def for_robot(robot):
+def for_robot(robot: Robot) -> Effect | None:
     """The effect model for all drives that slide, None where none does."""
     held = [strain for k, unit in enumerate(robot.parts.units) if unit == "mm" for strain in _held(robot, k)]
     if not held:
         return None
     parameters = ParameterSet((*(parameter for parameter, *_ in held), TIME_CONSTANT))
 
-    def grown(motion, values):
+    def grown(motion: Motion, values: FloatArray) -> Contribution:
         """Changes of the actuator values under the strains and the time constant in s."""
         *strains, time_constant = values
         change = np.zeros(motion.drive.shape)
@@ -44,7 +46,7 @@ def for_robot(robot):
     return Effect("screw_growth", parameters, plain_coordinates(parameters, _TYPICAL, SHAPES), grown, ("time_s",))
 
 
-def _held(robot, drive):
+def _held(robot: Robot, drive: int) -> list[tuple[Parameter, int, float]]:
     """Strains of a drive (its number from 0 on) by the ends at which its screw may be held: parameter, drive, value."""
     low, high = (0.0, np.nan) if robot.drive_range is None else robot.drive_range[drive]
     number = drive + 1

@@ -21,21 +21,23 @@ second.
 
 import numpy as np
 
-from rrru.effects.protocol import Effect, leg_parameters, plain_coordinates
+from rrru.effects.protocol import Contribution, Effect, Motion, leg_parameters, plain_coordinates
+from rrru.kinematics.arrays import FloatArray
+from rrru.kinematics.robot import Robot
 from rrru.parameters import ParameterSet
 
 _LAG = ("s", 0.0, 0.1)
 _SOURCE = "inverse of the position loop's gain, assumed"
 
 
-def for_robot(robot):
+def for_robot(robot: Robot) -> Effect:
     """The effect model for all drives."""
     lags = leg_parameters(_SOURCE, ("lag", *_LAG), count=len(robot.parts.drives))
     parameters = ParameterSet(lags)
     return Effect("servo_lag", parameters, plain_coordinates(parameters, 0.003), _late, ("drive_rate",))
 
 
-def _late(motion, delay):
+def _late(motion: Motion, delay: FloatArray) -> Contribution:
     """Changes of the actuator values under delays (K,) in s."""
     curvature, rate = np.nan_to_num(motion.drive_acceleration), np.nan_to_num(motion.drive_rate)
     return motion.at_drives(0.5 * delay**2 * curvature - delay * rate)

@@ -16,21 +16,23 @@ DeWitt, Fundamentals of Heat and Mass Transfer, table A.1.
 
 import numpy as np
 
-from rrru.effects.protocol import Contribution, Effect, plain_coordinates
+from rrru.effects.protocol import Contribution, Effect, Motion, plain_coordinates
 from rrru.effects.thermal_growth import lengths
+from rrru.kinematics.arrays import FloatArray
+from rrru.kinematics.robot import Robot
 from rrru.parameters import Parameter, ParameterSet
 
 _PARAMETERS = ParameterSet((Parameter("expansion", "1/K", 0.0, 0.0, 1e-4, "aluminium 2.3e-5, steel 1.2e-5"),))
 _TYPICAL, _DRAWN_C = 2e-5, 20.0
 
 
-def for_robot(_robot):
+def for_robot(_robot: Robot) -> Effect:
     """The effect model, the same for every robot."""
     coordinates = plain_coordinates(_PARAMETERS, _TYPICAL)
     return Effect("thermal_expansion", _PARAMETERS, coordinates, _grown, ("temperature_c",))
 
 
-def _grown(motion, values):
+def _grown(motion: Motion, values: FloatArray) -> Contribution:
     """Shifts of every link's end by its growth under a coefficient (1,); none where no temperature is known."""
     share = values[0] * np.nan_to_num(motion.temperature_c - _DRAWN_C)
     return Contribution(np.multiply.outer(share, lengths(motion.robot.legs)))

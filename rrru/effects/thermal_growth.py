@@ -21,7 +21,10 @@ aluminium has 2.3e-5 per kelvin, so that 10 K make 2.3e-4; time constants from h
 
 import numpy as np
 
-from rrru.effects.protocol import Contribution, Effect, plain_coordinates
+from rrru.effects.protocol import Contribution, Effect, Motion, plain_coordinates
+from rrru.kinematics.arrays import FloatArray
+from rrru.kinematics.legs import Legs
+from rrru.kinematics.robot import Robot
 from rrru.parameters import Parameter, ParameterSet
 
 TIME_CONSTANT = Parameter("time_constant", "s", 600.0, 1.0, 1e5, "lumped body, assumed")
@@ -34,18 +37,18 @@ _PARAMETERS = ParameterSet(
 )
 
 
-def warmth(motion, time_constant):
+def warmth(motion: Motion, time_constant: float) -> FloatArray:
     """Share (n,) of its final excess temperature that a body has; 0 where the time is unknown."""
     return -np.expm1(-np.nan_to_num(motion.time_s) / time_constant)
 
 
-def _grown(motion, values):
+def _grown(motion: Motion, values: FloatArray) -> Contribution:
     """Shifts of every link's end by its growth under final strain and time constant in s."""
     strain, time_constant = values
     return Contribution(np.multiply.outer(strain * warmth(motion, time_constant), lengths(motion.robot.legs)))
 
 
-def lengths(legs):
+def lengths(legs: Legs) -> FloatArray:
     """Twists (sites, 6) that make every length longer by its own size: the lengths at each site."""
     result = np.zeros((len(legs.sites), 6))
     for leg in legs.legs:
@@ -57,6 +60,6 @@ def lengths(legs):
     return result
 
 
-def for_robot(_robot):
+def for_robot(_robot: Robot) -> Effect:
     """The effect model, the same for every robot."""
     return Effect("thermal_growth", _PARAMETERS, plain_coordinates(_PARAMETERS, 2e-4, SHAPES), _grown, ("time_s",))

@@ -16,8 +16,10 @@ Manipulator Calibration, 1991). Typical size assumed: 0.5 mm.
 
 import numpy as np
 
-from rrru.effects.protocol import Effect, plain_coordinates
+from rrru.effects.protocol import Contribution, Effect, Motion, plain_coordinates
+from rrru.kinematics.arrays import FloatArray
 from rrru.kinematics.legs import TOOL
+from rrru.kinematics.robot import Robot
 from rrru.parameters import Parameter, ParameterSet
 
 _SOURCE = "seat of the reflector, size assumed"
@@ -26,13 +28,13 @@ _PARAMETERS = ParameterSet(tuple(Parameter(f"offset_{axis}", "mm", 0.0, -50.0, 5
 _POSITION_ONLY = 3
 
 
-def for_robot(robot):
+def for_robot(robot: Robot) -> Effect | None:
     """The effect model for robots whose drives turn the platform, None for others."""
     if len(robot.parts.drives) <= _POSITION_ONLY:
         return None
     return Effect("tool_offset", _PARAMETERS, plain_coordinates(_PARAMETERS, 0.5), _seated)
 
 
-def _seated(motion, values):
+def _seated(motion: Motion, values: FloatArray) -> Contribution:
     """The tool's shift by offsets (3,) in mm."""
     return motion.at({TOOL: np.concatenate([values, np.zeros(3)])[None]})

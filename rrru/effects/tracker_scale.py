@@ -22,20 +22,22 @@ aluminium) make more, sizes assumed.
 
 import numpy as np
 
-from rrru.effects.protocol import Effect, plain_coordinates
+from rrru.effects.protocol import Contribution, Effect, Motion, plain_coordinates
+from rrru.kinematics.arrays import FloatArray
 from rrru.kinematics.legs import WORLD
+from rrru.kinematics.robot import Robot
 from rrru.parameters import Parameter, ParameterSet
 
 _PARAMETERS = ParameterSet((Parameter("scale", "1", 0.0, -1e-3, 1e-3, "refraction or temperature, size assumed"),))
 _COORDINATES = plain_coordinates(_PARAMETERS, 5e-5)
 
 
-def _scaled(motion, values):
+def _scaled(motion: Motion, values: FloatArray) -> Contribution:
     """The world's twist at every point under the share by which distances are too long."""
     shift = values[0] * motion.position_mm
     return motion.at({WORLD: np.concatenate([shift, np.zeros_like(shift)], axis=1)})
 
 
-def for_robot(_robot):
+def for_robot(_robot: Robot) -> Effect:
     """The effect model, the same for every robot."""
     return Effect("tracker_scale", _PARAMETERS, _COORDINATES, _scaled)

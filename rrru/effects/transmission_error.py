@@ -29,7 +29,9 @@ from dataclasses import replace
 import numpy as np
 
 from rrru.effects.harmonic import at_harmonic, drives_of, harmonic_coordinates, harmonic_parameters
-from rrru.effects.protocol import Effect, Search
+from rrru.effects.protocol import Contribution, Effect, EffectModel, Motion, Search
+from rrru.kinematics.arrays import FloatArray, IntArray
+from rrru.kinematics.robot import Robot
 from rrru.parameters import Parameter, ParameterSet
 
 _RATIO = Parameter("ratio", "1", 50.0, 1.0, 1000.0, "gear ratio, 50 by default")
@@ -37,7 +39,7 @@ _LEAD = Parameter("lead", "mm", 10.0, 0.5, 2000.0, "lead of the screw or circumf
 _GEAR, _SCREW = "assumed: up to some arc minutes", "screw out of true, assumed: up to some hundredths of a millimetre"
 
 
-def _inverse(number):
+def _inverse(number: float) -> float:
     """Radians of the wave per millimetre of the slide for a lead, and the other way."""
     return 2.0 * np.pi / number
 
@@ -47,31 +49,33 @@ _RATIOS = Search("ratio", "rad", 200.0, float, float)
 _LEADS = Search("lead", "mm", _inverse(_LEAD.low), _inverse, _inverse)
 
 
-def for_robot(robot):
+def for_robot(robot: Robot) -> Effect:
     """The effect model for the drives that turn, or for all where none does."""
     turning = drives_of(robot, "rad")
     return _of_gears(turning) if len(turning) else _of_screws(drives_of(robot, "mm"))
 
 
-def _of_gears(drives):
+def _of_gears(drives: IntArray) -> Effect:
     """The effect model for turning drives (k,)."""
 
-    def gear_error(motion, values):
+    def gear_error(motion: Motion, values: FloatArray) -> Contribution:
         return at_harmonic(motion, drives, values[-1], values)
 
     return _effect(harmonic_parameters(drives, _GEAR), _RATIO, _RATIOS, 3e-4, gear_error)
 
 
-def _of_screws(drives):
+def _of_screws(drives: IntArray) -> Effect:
     """The effect model for sliding drives (k,)."""
 
-    def screw_error(motion, values):
+    def screw_error(motion: Motion, values: FloatArray) -> Contribution:
         return at_harmonic(motion, drives, _inverse(values[-1]), values)
 
     return _effect(harmonic_parameters(drives, _SCREW, "mm", 1.0), _LEAD, _LEADS, 0.01, screw_error)
 
 
-def _effect(sizes, known, search, typical, error):
+def _effect(
+    sizes: tuple[Parameter, ...], known: Parameter, search: Search, typical: float, error: EffectModel
+) -> Effect:
     """The Effect of amplitudes and phases, and of a ratio or lead that is known or searched; error: its function."""
     parameters = ParameterSet((*sizes, known))
     coordinates = harmonic_coordinates(parameters, typical, ({known.name: known.nominal},))

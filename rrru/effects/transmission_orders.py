@@ -14,21 +14,25 @@ Source: Litvin and Fuentes, Gear Geometry and Applied Theory, 2004; the search i
 IEEE Transactions on Signal Processing 41, 1993). The size is assumed: one arc minute is 3e-4 rad.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from rrru.effects.harmonic import waves
-from rrru.effects.protocol import Coordinates, Effect
+from rrru.effects.protocol import Contribution, Coordinates, Effect, Motion
+from rrru.kinematics.arrays import FloatArray
+from rrru.kinematics.robot import Robot
 from rrru.parameters import Parameter, ParameterSet
 
 _TYPICAL, _MOST = 3e-4, 0.01
 
 
-def for_robot(robot):
+def for_robot(robot: Robot) -> Effect | None:
     """The effect model, whose waves are still to be found, for robots whose drives all turn, None for others."""
     return _with_waves(()) if set(robot.parts.units) == {"rad"} else None
 
 
-def _with_waves(pairs, log_prior=0.0):
+def _with_waves(pairs: Sequence[tuple[int, float]], log_prior: float = 0.0) -> Effect:
     """The effect model with waves (drive, order), drives counted from 0 on; log_prior: of having chosen just these."""
     parameters = ParameterSet(
         tuple(
@@ -49,7 +53,7 @@ def _with_waves(pairs, log_prior=0.0):
     drives = np.array([drive for drive, _ in pairs], dtype=int)
     orders = np.array([order for _, order in pairs], dtype=float)
 
-    def err(motion, values):
+    def err(motion: Motion, values: FloatArray) -> Contribution:
         """Changes of the drive angles under sines and cosines (2 waves,) in rad."""
         changes = np.zeros_like(motion.drive)
         for drive in np.unique(drives):
@@ -57,5 +61,12 @@ def _with_waves(pairs, log_prior=0.0):
             changes[:, drive] = waves(motion.drive[:, drive], orders[its]) @ np.reshape(values, (-1, 2))[its].ravel()
         return motion.at_drives(changes)
 
-    structure = {"of_drive_value": True, "with_waves": _with_waves, "waves": tuple(pairs)}
-    return Effect("transmission_orders", parameters, coordinates, err, **structure)
+    return Effect(
+        "transmission_orders",
+        parameters,
+        coordinates,
+        err,
+        of_drive_value=True,
+        with_waves=_with_waves,
+        waves=tuple(pairs),
+    )

@@ -4,12 +4,16 @@ These are added to its parameters as directions at sites, as far as they are ide
 together with the robot's own. Everything except the inverse then uses the general model. Lengths in mm, angles in rad.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
-from rrru.kinematics.base_parameters import MeasurementConfig, choose, direction, offered, open_numbers
+from rrru.kinematics.arrays import BoolArray, FloatArray
+from rrru.kinematics.base_parameters import Candidate, MeasurementConfig, choose, direction, offered, open_numbers
+from rrru.kinematics.legs import Legs
+from rrru.kinematics.readings import Readings
 from rrru.kinematics.robot import Robot
 from rrru.parameters import Parameter, ParameterSet
 
@@ -24,20 +28,20 @@ class AugmentedRobot(Robot):
 
     robot: Robot
     reads: MeasurementConfig
-    added: tuple | None = None
+    added: tuple[Candidate, ...] | None = None
 
     @cached_property
-    def legs(self):
+    def legs(self) -> Legs:
         """The robot's legs, with the reflectors as sites."""
         return replace(self.robot.legs, reflectors=self.reads.reflectors)
 
     @property
-    def _added(self):
+    def _added(self) -> tuple[Candidate, ...]:
         """The Candidates in addition to the robot's own parameters."""
         return open_numbers(self.reads) if self.added is None else self.added
 
     @cached_property
-    def parameters(self):
+    def parameters(self) -> ParameterSet:
         """The robot's parameters and the added ones, nominally zero."""
         limits = {"mm": _LENGTH_LIMIT_MM, "rad": _ANGLE_LIMIT_RAD}
         bounds = ((added, limits[added.unit]) for added in self._added)
@@ -45,17 +49,19 @@ class AugmentedRobot(Robot):
         return ParameterSet((*self.robot.parameters, *more))
 
     @cached_property
-    def directions(self):
+    def directions(self) -> FloatArray:
         """Twists (sites, 6, p) that a unit of each parameter makes."""
         robots = np.pad(self.robot.directions, ((0, len(self.legs.reflectors)), (0, 0), (0, 0)))
         return np.concatenate([robots, *(direction(self.legs, added)[:, :, None] for added in self._added)], axis=2)
 
     @property
-    def offered(self):
+    def offered(self) -> BoolArray:
         """Which components (sites, 6) of constant twists its readings leave open."""
         return offered(self.legs, open_numbers(self.reads))
 
-    def seen_at(self, actuators, position_mm, readings=None):
+    def seen_at(
+        self, actuators: FloatArray, position_mm: FloatArray, readings: Readings | None = None
+    ) -> "AugmentedRobot":
         """The robot with the added parameters that are identifiable at poses (n, K), (n, 3) with Readings."""
         complete = replace(self, added=self._added)
         poses = complete.solve(actuators, position_mm)
@@ -68,25 +74,25 @@ class AugmentedRobot(Robot):
         chosen, _ = choose(columns[:, count:] * scale, [True] * len(scale), _LEFT_OF_DATA, basis)
         return replace(self, added=tuple(self._added[k] for k in chosen))
 
-    def reading(self, reads):
+    def reading(self, reads: MeasurementConfig) -> Robot:
         """The robot with another MeasurementConfig."""
         return self.robot.reading(reads)
 
-    def inverse(self, position_mm, deviations=None, elbow="out"):
+    def inverse(self, position_mm: FloatArray, deviations: FloatArray | None = None, elbow: str = "out") -> FloatArray:
         """Actuator values (n, K) for positions (n, 3) in the robot's own frame by its own parameters; see Robot."""
         robots = None if deviations is None else np.asarray(deviations)[: len(self.robot.parameters)]
         return self.robot.inverse(position_mm, robots, elbow)
 
-    def widened(self, angle_rad, length_mm):
+    def widened(self, angle_rad: float, length_mm: float) -> "AugmentedRobot":
         """The robot with other bounds of its own parameters."""
         return replace(self, robot=self.robot.widened(angle_rad, length_mm))
 
     @property
-    def deviation_names(self):
+    def deviation_names(self) -> tuple[str, ...]:
         """Names of the deviations that `twists_of` knows: the robot's and the added ones."""
         return (*self.robot.deviation_names, *(added.name for added in self._added))
 
-    def twists_of(self, values):
+    def twists_of(self, values: Mapping[str, float]) -> FloatArray:
         """Twists (1, sites, 6) of the robot's deviations and of added ones by name."""
         known = {added.name: added for added in self._added}
         robots = self.robot.twists_of({name: value for name, value in values.items() if name not in known})
@@ -96,12 +102,12 @@ class AugmentedRobot(Robot):
                 result[0] += value * direction(self.legs, known[name])
         return result
 
-    def identifiable(self, values):
+    def identifiable(self, values: dict[str, float]) -> dict[str, float]:
         """Mapping of the parameters from values of any of the robot's own; the added ones are unknown."""
         return self.robot.identifiable(values)
 
 
-def _own(name):
+def _own(name: str) -> property:
     """A property that is the robot's own, an attribute or a method."""
     return property(lambda self: getattr(self.robot, name), doc="The robot's own.")
 

@@ -1,10 +1,12 @@
 """The geometric parameters of any robot, and which of them are identifiable (base parameters). mm, rad."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from rrru.kinematics.legs import TOOL, WORLD, unit_twist
+from rrru.kinematics.arrays import BoolArray, FloatArray
+from rrru.kinematics.legs import TOOL, WORLD, Legs, Parts, unit_twist
 from rrru.parameters import Parameter, ParameterSet
 
 # largest error of a drive's lost zero offset, in rad and in mm
@@ -19,7 +21,7 @@ class Candidate:
     name: str
     unit: str
     leg: int
-    twists: dict[str, np.ndarray]
+    twists: dict[str, FloatArray]
 
 
 @dataclass(frozen=True)
@@ -45,7 +47,7 @@ def open_numbers(reads: MeasurementConfig) -> tuple[Candidate, ...]:
     return tuple(_at(*place) for place in places + [(WORLD, k) for k in range(6) if reads.frame])
 
 
-def candidates_of(legs, parts, reads=None):
+def candidates_of(legs: Legs, parts: Parts, reads: MeasurementConfig | None = None) -> tuple[Candidate, ...]:
     """All Candidates of Legs, drives first, then lengths along links, other shifts, angles, tool and world.
 
     Those of the MeasurementConfig come before the others of tool and world.
@@ -56,7 +58,9 @@ def candidates_of(legs, parts, reads=None):
         for number, drive in enumerate(parts.drives, 1)
     ]
     taken = {(drive.site, int(np.abs(drive.twist).argmax())) for drive in parts.drives}
-    lengths, shifts, turns = [], [], []
+    lengths: list[tuple[str, int]] = []
+    shifts: list[tuple[str, int]] = []
+    turns: list[tuple[str, int]] = []
     for joint in legs.joints:
         if joint.kind == "fixed" and not np.any(joint.shift_mm) and np.array_equal(joint.turn, np.eye(3)):
             continue
@@ -77,13 +81,13 @@ def candidates_of(legs, parts, reads=None):
     return tuple({candidate.name: candidate for candidate in every}.values())
 
 
-def _at(site, component):
+def _at(site: str, component: int) -> Candidate:
     """The Candidate of one component of a site's twist."""
     name = f"{site.replace(' ', '_')}_{_AXES[component]}"
     return Candidate(name, "mm" if component < 3 else "rad", 0, {site: unit_twist(component)})
 
 
-def bounded(candidates, limits):
+def bounded(candidates: Sequence[Candidate], limits: Mapping[str, float]) -> ParameterSet:
     """The ParameterSet of Candidates, nominally zero, bounded by their unit's limit, drives by a lost zero offset."""
     most = (max(limits[one.unit], _LOST[one.unit] if one.leg else 0.0) for one in candidates)
     return ParameterSet(
@@ -94,13 +98,13 @@ def bounded(candidates, limits):
     )
 
 
-def stages(candidates, outside):
+def stages(candidates: Sequence[Candidate], outside: set[str]) -> tuple[BoolArray, BoolArray]:
     """Which Candidates (p,) are of sites outside the robot, such as the frame, and which are these or drives."""
     frames = np.array([outside.issuperset(one.twists) for one in candidates])
     return frames, frames | np.array([one.leg > 0 for one in candidates])
 
 
-def direction(legs, candidate):
+def direction(legs: Legs, candidate: Candidate) -> FloatArray:
     """The twists (sites, 6) of a unit of a Candidate."""
     result = np.zeros((len(legs.sites), 6))
     for site, twist in candidate.twists.items():
@@ -108,12 +112,14 @@ def direction(legs, candidate):
     return result
 
 
-def offered(legs, candidates):
+def offered(legs: Legs, candidates: Sequence[Candidate]) -> BoolArray:
     """Which components (sites, 6) of twists Candidates represent."""
-    return np.any([direction(legs, one).astype(bool) for one in candidates], axis=0)
+    return np.asarray(np.any([direction(legs, one).astype(bool) for one in candidates], axis=0))
 
 
-def choose(columns, allowed, least, basis=None):
+def choose(
+    columns: FloatArray, allowed: Sequence[bool], least: float, basis: FloatArray | None = None
+) -> tuple[list[int], dict[int, FloatArray]]:
     """Numbers of the columns (m, c) of which more than the share `least` is independent of the chosen ones before.
 
     allowed (c,): which may be chosen; basis (m, b): orthonormal columns that are chosen already. Returns also
@@ -132,7 +138,7 @@ def choose(columns, allowed, least, basis=None):
     return chosen, combined
 
 
-def in_words(combination, names):
+def in_words(combination: FloatArray, names: Sequence[str]) -> str:
     """A combination (k,) of the first k names, such as "0.71 base1_x - 0.2 dl1"; "nothing" where it is none."""
     terms = (f"{c:.3g} {name}" for c, name in zip(combination, names, strict=False) if abs(c) > 1e-6)
     return " + ".join(terms).replace("+ -", "- ") or "nothing"

@@ -3,21 +3,25 @@
 Numba's cache does not see other files; so all functions that these call are here. Lengths in mm, angles in rad.
 """
 
-import numba
 import numpy as np
 
+from rrru.kinematics.arrays import BoolArray, FloatArray, IntArray
+from rrru.kinematics.typed_numba import njit
+
+Triple = FloatArray | tuple[float, float, float]
+
 # called by compiled code only
-_part = numba.njit(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
+_part = njit(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
 
 
 @_part
-def _cross(a, b):
+def _cross(a: Triple, b: Triple) -> tuple[float, float, float]:
     """Cross product of two triples."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
 @_part
-def _carried(turn, vector):
+def _carried(turn: FloatArray, vector: Triple) -> tuple[float, float, float]:
     """A vector (3,) of a frame in space."""
     x, y, z = vector[0], vector[1], vector[2]
     return (
@@ -28,7 +32,7 @@ def _carried(turn, vector):
 
 
 @_part
-def _back(turn, vector):
+def _back(turn: FloatArray, vector: Triple) -> tuple[float, float, float]:
     """A vector (3,) in space in a frame."""
     x, y, z = vector[0], vector[1], vector[2]
     return (
@@ -39,7 +43,7 @@ def _back(turn, vector):
 
 
 @_part
-def _shift(place, turn, vector, factor):
+def _shift(place: FloatArray, turn: FloatArray, vector: Triple, factor: float) -> None:
     """A place moved by a multiple of a vector (3,) of a frame."""
     by = _carried(turn, vector)
     for c in range(3):
@@ -47,14 +51,14 @@ def _shift(place, turn, vector, factor):
 
 
 @_part
-def _append(turn, more):
+def _append(turn: FloatArray, more: FloatArray) -> None:
     """A frame turned by another in it, whose axes are the rows of (3, 3)."""
     for row in turn:
         row[0], row[1], row[2] = _carried(more, row)
 
 
 @_part
-def _rotate(turn, vector, factor):
+def _rotate(turn: FloatArray, vector: Triple, factor: float) -> None:
     """A frame turned by a multiple of a rotation vector (3,) in it (Rodrigues)."""
     w = factor * vector[0], factor * vector[1], factor * vector[2]
     angle = np.sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2])
@@ -69,8 +73,18 @@ def _rotate(turn, vector, factor):
             row[c] += first * once[c] + second * twice[c]
 
 
-@numba.njit(cache=True, error_model="numpy")
-def follow(frames, motions, numbers, values, twists, active, turns, places, axes):
+@njit(cache=True, error_model="numpy")
+def follow(
+    frames: FloatArray,
+    motions: FloatArray,
+    numbers: IntArray,
+    values: FloatArray,
+    twists: FloatArray,
+    active: BoolArray,
+    turns: FloatArray,
+    places: FloatArray,
+    axes: FloatArray,
+) -> None:
     """Frames at the joints of a leg and at its end at n points, from the base on, into turns, places and axes.
 
     frames, motions, numbers: of `rrru.kinematics.legs.Chain`; values (n, k + D): passive and driven ones; twists (n or
@@ -100,8 +114,16 @@ def follow(frames, motions, numbers, values, twists, active, turns, places, axes
         turns[-1, n], places[-1, n] = turn, place
 
 
-@numba.njit(cache=True, error_model="numpy")
-def reach(near, position, turn, point, far, frames, spans):
+@njit(cache=True, error_model="numpy")
+def reach(
+    near: FloatArray,
+    position: FloatArray,
+    turn: FloatArray,
+    point: FloatArray,
+    far: FloatArray,
+    frames: FloatArray,
+    spans: FloatArray,
+) -> None:
     """Bars from near (n, 3) to points (n or 1, 3) of platforms at position (n, 3) and turn (n, 3, 3).
 
     Writes their far ends (n, 3), spans (n,) and right-handed frames (n, 3, 3), whose first column points along them and
@@ -123,8 +145,16 @@ def reach(near, position, turn, point, far, frames, spans):
             frames[n, c, 0], frames[n, c, 1], frames[n, c, 2] = along[c], side[c], up[c]
 
 
-@numba.njit(cache=True, error_model="numpy")
-def sweep(motion, legs, numbers, turns, places, twists, result):
+@njit(cache=True, error_model="numpy")
+def sweep(
+    motion: FloatArray,
+    legs: IntArray,
+    numbers: IntArray,
+    turns: FloatArray,
+    places: FloatArray,
+    twists: FloatArray,
+    result: FloatArray,
+) -> None:
     """Motion per small twist at sites of legs, in their frames, into result (n, 3, S, 6).
 
     motion (legs, n, 3, 6): per unit of the six parts of a twist of a leg's end at the world's origin; legs, numbers
@@ -148,7 +178,7 @@ def sweep(motion, legs, numbers, turns, places, twists, result):
 
 
 @_part
-def _added(angle):
+def _added(angle: float) -> tuple[float, float]:
     """Factors of the first and second power of a rotation vector in the axes about which what is added to it turns."""
     if angle < 1e-4:
         return 0.5, 1.0 / 6.0

@@ -11,16 +11,41 @@ least squares. Screws and twists are at the world's origin, the velocity first: 
 `rrru.kinematics.closure_kernel` takes the legs as flat arrays. Lengths in mm, angles in rad.
 """
 
+from collections.abc import Sequence, Set
+from typing import Protocol
+
 import numpy as np
 
 from rrru.errors import ConfigError
 from rrru.kinematics import closure_kernel
-from rrru.kinematics.chain import Poses, Twists
-from rrru.kinematics.closure_kernel import ARM_MM
+from rrru.kinematics.arrays import BoolArray, FloatArray
+from rrru.kinematics.chain import PoseGuess, Poses, Twists, Walk
+from rrru.kinematics.closure_kernel import ARM_MM, Tables
+from rrru.kinematics.legs import Leg, Legs
 from rrru.kinematics.wrenches import SCALE, by_group, constraints_of, spare_joints, wrenches_of
 
 # a pose with a larger residual is not closed
 _CLOSED_MM = 1e-7
+
+
+class ForwardModel(Protocol):
+    """Legs whose ends are found at actuator values: those of one platform, `Closure`, or separate ones.
+
+    rows: of every leg its rows of A; row_count: of all.
+    """
+
+    legs: Legs
+    rows: list[slice]
+    row_count: int
+
+    def wrenches(self, ways: Sequence[Walk], poses: Poses, /) -> list[FloatArray]:
+        """Wrenches (n, r, 6) of every leg that constrain what it carries."""
+
+    def inverse(self, wrenches: Sequence[FloatArray]) -> FloatArray:
+        """Twists (n, 6, rows) per constraint."""
+
+    def solve(self, actuators: FloatArray, start: PoseGuess, twists: FloatArray | None = None) -> Poses:
+        """Poses at actuator values (n, K) next to `start`, under finite twists (n or 1, sites, 6)."""
 
 
 class Closure:
@@ -29,7 +54,7 @@ class Closure:
     rows: of every leg its rows of A, the same for all legs that share passive joints; row_count: of all.
     """
 
-    def __init__(self, legs):
+    def __init__(self, legs: Legs) -> None:
         self.legs, groups = legs, legs.groups
         self._spare = spare_joints(legs)
         counts = constraints_of(legs, self._spare)
@@ -45,19 +70,19 @@ class Closure:
         slices = {k: slice(*ends[row : row + 2]) for row, group in enumerate(groups) for k in group}
         self.row_count, self.rows = int(ends[-1]), [slices[k] for k in range(len(legs.legs))]
 
-    def wrenches(self, ways, _poses):
+    def wrenches(self, ways: Sequence[Walk], _poses: Poses) -> list[FloatArray]:
         """Wrenches (n, r, 6) of every leg that are reciprocal to its passive joints."""
         return wrenches_of(self.legs, self._spare, ways)
 
-    def inverse(self, wrenches):
+    def inverse(self, wrenches: Sequence[FloatArray]) -> FloatArray:
         """Twists (n, 6, rows) of the platform per constraint, the inverse of the wrenches A of all legs."""
         if self._driven:
             return np.broadcast_to(np.eye(6), wrenches[0].shape)
         rows = np.concatenate(by_group(self.legs, wrenches), axis=1)
-        return SCALE[:, None] * _inverse(rows * SCALE * self._weights) * self._weights.T
+        return np.asarray(SCALE[:, None] * _inverse(rows * SCALE * self._weights) * self._weights.T)
 
-    def solve(self, actuators, start, twists=None):
-        """Poses at actuator values (n, K) next to the Poses `start`, under finite twists (n or 1, sites, 6).
+    def solve(self, actuators: FloatArray, start: PoseGuess, twists: FloatArray | None = None) -> Poses:
+        """Poses at actuator values (n, K) next to `start`, under finite twists (n or 1, sites, 6).
 
         NaN where Newton does not converge.
         """
@@ -65,17 +90,17 @@ class Closure:
         return Poses(*closed(self._tables, driven, start, Twists(self.legs, twists), self.row_count == 6))
 
 
-def _inverse(matrices):
+def _inverse(matrices: FloatArray) -> FloatArray:
     """Inverses of (n, r, 6), those of least squares for r > 6 and where a matrix is singular."""
     if matrices.shape[1] == 6:
         try:
-            return np.linalg.inv(matrices)
+            return np.asarray(np.linalg.inv(matrices), dtype=float)
         except np.linalg.LinAlgError:
             pass
-    return np.linalg.pinv(matrices)
+    return np.asarray(np.linalg.pinv(matrices), dtype=float)
 
 
-def tables(legs, spare):
+def tables(legs: Legs, spare: Set[str]) -> Tables:
     """Arrays of Legs with m joints, q of them passive, counted once per leg that has them; -1 where there is none.
 
     slots (m + legs, 3): of every joint, and of what follows a leg's last one, the site, the drive and whether a link
@@ -86,7 +111,8 @@ def tables(legs, spare):
     the value of each; turning (k,): whether the joint of a value turns. Raises ConfigError for a passive joint before a
     bar.
     """
-    slots, frames, motions, ends, bars, screws, values = [], [], [], [], [], [], []
+    slots, frames, motions, ends, bars, values = [], [], [], [], [], []
+    screws: list[list[float]] = []
     for number, leg in enumerate(legs.legs):
         passive, chain = [joint for joint in leg.joints if joint.passive], legs.chains[leg.name]
         if leg.bar and passive:
@@ -118,15 +144,18 @@ def tables(legs, spare):
     return *parts, np.array(values, dtype=np.int64), turning
 
 
-def _bar_numbers(legs, leg):
+def _bar_numbers(legs: Legs, leg: Leg) -> tuple[int, int, int, int]:
     """Of a leg whether a bar ends it, its drive and both its sites."""
     if not leg.bar:
         return 0, -1, -1, -1
-    return 1, -1 if leg.bar.drive is None else leg.bar.drive, *(legs.site_numbers[name] for name in leg.bar_sites)
+    bar_site, end_site = (legs.site_numbers[name] for name in leg.bar_sites)
+    return 1, -1 if leg.bar.drive is None else leg.bar.drive, bar_site, end_site
 
 
-def closed(tables, actuators, start, twists, all_met):
-    """The fields of Poses at actuator values (n, K), next to the Poses `start`; NaN where Newton does not converge.
+def closed(
+    tables: Tables, actuators: FloatArray, start: PoseGuess, twists: Twists, all_met: bool
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, BoolArray]:
+    """The fields of Poses at actuator values (n, K), next to `start`; NaN where Newton does not converge.
 
     twists: Twists at n points or one; all_met: whether all constraints can be met, not only by least squares. The
     residual is inf where actuator values or start are unknown. Raises ValueError where shapes do not fit.
@@ -147,7 +176,8 @@ def closed(tables, actuators, start, twists, all_met):
     known = np.isfinite(sum(one.sum(axis=tuple(range(1, one.ndim))) for one in state))
     drives, platform, passive = state
     # links, a frame, screws and equations of one point after the other
-    room = tuple(np.empty(shape) for shape in ((len(screws) + legs, 4, 3), (4, 3), (len(screws), 6), (k + 6, k + 8)))
+    count = len(screws)
+    room = np.empty((count + legs, 4, 3)), np.empty((4, 3)), np.empty((count, 6)), np.empty((k + 6, k + 8))
     left, lacks = np.empty(n), np.zeros((n, legs, 6))
     closure_kernel.solve(tables, room, drives, twists.values, twists.active, platform, passive, left, lacks)
     if all_met:

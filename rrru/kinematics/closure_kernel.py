@@ -9,8 +9,10 @@ between two passive joints are multiplied into one frame. A frame (4, 3) has its
 mm, angles in rad; in screws and small twists lengths are counted in the arm.
 """
 
-import numba
 import numpy as np
+
+from rrru.kinematics.arrays import BoolArray, FloatArray, IntArray
+from rrru.kinematics.typed_numba import njit
 
 TOLERANCE_MM, MOST_STEPS = 1e-10, 60
 # a step turns by less and moves by less than this
@@ -19,32 +21,36 @@ ARM_MM = 500.0
 # share of a squared screw that must be independent of the directions before it
 _INDEPENDENT_SHARE = 1e-13
 
+Triple = FloatArray | tuple[float, float, float]
+# see `rrru.kinematics.closure.tables`
+Tables = tuple[IntArray, FloatArray, FloatArray, IntArray, FloatArray, FloatArray, IntArray, BoolArray]
+
 # called by compiled code only
-_part = numba.njit(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
+_part = njit(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
 # part of its one caller before that is compiled; it would be compiled twice otherwise
-_inside = numba.njit(inline="always", error_model="numpy")
+_inside = njit(inline="always", error_model="numpy")
 
 
 @_part
-def _cross(a, b):
+def _cross(a: Triple, b: Triple) -> tuple[float, float, float]:
     """Cross product of two triples."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
 @_part
-def _triple(row):
+def _triple(row: FloatArray) -> tuple[float, float, float]:
     """A row (3,) as three numbers."""
     return row[0], row[1], row[2]
 
 
 @_part
-def _dot(a, b):
+def _dot(a: FloatArray, b: FloatArray) -> float:
     """Product of two rows (6,)."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3] + a[4] * b[4] + a[5] * b[5]
 
 
 @_part
-def _carried(frame, vector):
+def _carried(frame: FloatArray, vector: FloatArray) -> tuple[float, float, float]:
     """A vector (3,) of a frame, in space."""
     x, y, z = vector[0], vector[1], vector[2]
     a, b, c = _triple(frame[0]), _triple(frame[1]), _triple(frame[2])
@@ -52,7 +58,7 @@ def _carried(frame, vector):
 
 
 @_part
-def _begin(frame):
+def _begin(frame: FloatArray) -> None:
     """A frame becomes the world's."""
     for i in range(4):
         for c in range(3):
@@ -60,7 +66,7 @@ def _begin(frame):
 
 
 @_part
-def _append(frame, part):
+def _append(frame: FloatArray, part: FloatArray) -> None:
     """A frame moved on by a part, a frame in it."""
     for c in range(3):
         x, y, z, place = frame[0, c], frame[1, c], frame[2, c], frame[3, c]
@@ -70,7 +76,7 @@ def _append(frame, part):
 
 
 @_part
-def _rotate(frame, w):
+def _rotate(frame: FloatArray, w: Triple) -> None:
     """A frame's axes turned about its place by a rotation vector in space (Rodrigues)."""
     angle = np.sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2])
     if angle == 0.0:
@@ -84,7 +90,9 @@ def _rotate(frame, w):
 
 
 @_part
-def _displace(frame, twist, factor):
+def _displace(
+    frame: FloatArray, twist: FloatArray, factor: float
+) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
     """A frame moved by a multiple of a twist (6,) in it, shift first; returns the twist's two vectors in space."""
     v, w = _carried(frame, twist[:3]), _carried(frame, twist[3:])
     for c in range(3):
@@ -94,7 +102,15 @@ def _displace(frame, twist, factor):
 
 
 @_part
-def _draw_together(slots, frames, motions, drives, twists, active, links):
+def _draw_together(
+    slots: IntArray,
+    frames: FloatArray,
+    motions: FloatArray,
+    drives: FloatArray,
+    twists: FloatArray,
+    active: BoolArray,
+    links: FloatArray,
+) -> None:
     """Links of one point: frames leg by leg from the base to the first passive joint, and so on to the leg's end."""
     row = 0
     for k in range(len(links)):
@@ -111,7 +127,16 @@ def _draw_together(slots, frames, motions, drives, twists, active, links):
 
 
 @_part
-def _chain(links, screws, values, numbers, platform, frame, basis, lack):
+def _chain(
+    links: FloatArray,
+    screws: FloatArray,
+    values: FloatArray,
+    numbers: IntArray,
+    platform: FloatArray,
+    frame: FloatArray,
+    basis: FloatArray,
+    lack: FloatArray,
+) -> None:
     """A chain walked to its end: its joints' screws (q, 6) in space and the small twist from the platform to there."""
     _begin(frame)
     for j in range(len(numbers)):
@@ -132,7 +157,7 @@ def _chain(links, screws, values, numbers, platform, frame, basis, lack):
 
 
 @_part
-def _count_chain(equations, k, basis, lack, numbers):
+def _count_chain(equations: FloatArray, k: int, basis: FloatArray, lack: FloatArray, numbers: IntArray) -> None:
     """A chain's square added to the equations."""
     for c in range(6):
         equations[k + c, k + c] += 1.0
@@ -146,7 +171,15 @@ def _count_chain(equations, k, basis, lack, numbers):
 
 
 @_part
-def _count_bar(equations, k, bar, near, platform, off, change):
+def _count_bar(
+    equations: FloatArray,
+    k: int,
+    bar: FloatArray,
+    near: FloatArray,
+    platform: FloatArray,
+    off: FloatArray,
+    change: float,
+) -> float:
     """A bar's square added to the equations, from near to a point that is off; returns what its length lacks."""
     p, q, a, b = _carried(platform, bar[1:]), _carried(platform, off), _triple(platform[3]), _triple(near)
     x, y, z = a[0] + p[0] - q[0] - b[0], a[1] + p[1] - q[1] - b[1], a[2] + p[2] - q[2] - b[2]
@@ -162,7 +195,7 @@ def _count_bar(equations, k, bar, near, platform, off, change):
 
 
 @_part
-def _resolve(equations):
+def _resolve(equations: FloatArray) -> None:
     """The solution of n equations (n, n + 2), the upper half of a symmetric matrix, into column n (Gauss)."""
     n = len(equations)
     for j in range(n):
@@ -182,7 +215,7 @@ def _resolve(equations):
 
 
 @_part
-def _advance(platform, values, turning, step):
+def _advance(platform: FloatArray, values: FloatArray, turning: BoolArray, step: FloatArray) -> float:
     """The platform and the passive joints moved by a step (k + 6,), or by a share of it; returns its size in mm."""
     k, turned, slid, moved = len(values), 0.0, 0.0, 0.0
     for j in range(k):
@@ -208,7 +241,18 @@ def _advance(platform, values, turning, step):
 
 
 @_inside
-def _newton(ends, bars, screws, numbers, turning, drives, twists, links, state, work):
+def _newton(
+    ends: IntArray,
+    bars: FloatArray,
+    screws: FloatArray,
+    numbers: IntArray,
+    turning: BoolArray,
+    drives: FloatArray,
+    twists: FloatArray,
+    links: FloatArray,
+    state: tuple[FloatArray, FloatArray, FloatArray],
+    work: tuple[FloatArray, FloatArray, FloatArray],
+) -> float:
     """Newton of one point, in place; returns the size of its last step in mm."""
     (platform, values, lacks), (frame, basis, equations) = state, work
     k, size = len(turning), np.inf
@@ -232,8 +276,18 @@ def _newton(ends, bars, screws, numbers, turning, drives, twists, links, state, 
 
 
 # no fastmath: code that was just compiled and the same code from the cache round alike
-@numba.njit(cache=True, error_model="numpy")
-def solve(tables, room, drives, twists, active, platform, passive, sizes, lacks):
+@njit(cache=True, error_model="numpy")
+def solve(
+    tables: Tables,
+    room: tuple[FloatArray, FloatArray, FloatArray, FloatArray],
+    drives: FloatArray,
+    twists: FloatArray,
+    active: BoolArray,
+    platform: FloatArray,
+    passive: FloatArray,
+    sizes: FloatArray,
+    lacks: FloatArray,
+) -> None:
     """Poses of n points, in place of where they start, under twists (n or 1, sites, 6) at the active sites (sites,).
 
     tables, room: of `rrru.kinematics.closure`; drives (n, K); platform (n, 4, 3): frames; passive (n, k). Writes

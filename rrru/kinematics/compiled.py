@@ -1,12 +1,16 @@
 """Objectives that compiled code can call: what a mechanism offers where a Python callable would be too slow."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any, cast
 
 import numba
 import numba.experimental.function_type  # registers the protocol below
 import numpy as np
 from numba import types
 from numba.extending import intrinsic
+
+from rrru.kinematics.arrays import FloatArray
 
 # a kernel writes the values (m,) of deviations (m, p); legs (3, k, 1 + p) and points (rows, n) are the robot's own
 SIGNATURE = types.void(types.float64[:, ::1], types.float64[:, :, ::1], types.float64[:, ::1], types.float64[::1])
@@ -15,17 +19,18 @@ SIGNATURE = types.void(types.float64[:, ::1], types.float64[:, :, ::1], types.fl
 class Kernel(types.WrapperAddressProtocol):
     """A function compiled for SIGNATURE, which compiled functions take as an argument without being compiled for it."""
 
-    def __init__(self, function):
+    def __init__(self, function: Callable[[FloatArray, FloatArray, FloatArray, FloatArray], None]) -> None:
         self.function = numba.njit(cache=True, error_model="numpy")(function)
         self.function.compile(SIGNATURE.args)
-        result = self.function.get_compile_result(SIGNATURE)
-        self._address = result.library.get_pointer_to_function(result.fndesc.llvm_cfunc_wrapper_name)
+        # numba states no attributes of a compile result
+        result: Any = self.function.get_compile_result(SIGNATURE)
+        self._address: int = result.library.get_pointer_to_function(result.fndesc.llvm_cfunc_wrapper_name)
 
-    def __wrapper_address__(self):
+    def __wrapper_address__(self) -> int:
         """Address of the machine code."""
         return self._address
 
-    def signature(self):
+    def signature(self) -> Any:
         """SIGNATURE, for numba."""
         return SIGNATURE
 
@@ -35,18 +40,21 @@ class CompiledObjective:
     """A Kernel and the arrays that it is given; callable from Python."""
 
     kernel: Kernel
-    legs: np.ndarray
-    points: np.ndarray
+    legs: FloatArray
+    points: FloatArray
 
-    def __call__(self, deviations):
+    def __call__(self, deviations: FloatArray) -> FloatArray:
         """Values (m,) of deviations (m, p); inf where a point leaves the reach."""
         values = np.empty(len(deviations))
         self.kernel.function(np.ascontiguousarray(deviations, dtype=float), self.legs, self.points, values)
         return values
 
 
-@intrinsic
-def fma(_typing, _a, _b, _c):
+def _fma(_typing: Any, _a: Any, _b: Any, _c: Any) -> tuple[Any, Callable[..., Any]]:
     """The sum a b + c rounded once, said explicitly: what a compiler may fuse depends on what it has inlined."""
     number = types.float64
     return number(number, number, number), lambda _context, builder, _signature, values: builder.fma(*values)
+
+
+# compiled code, which alone calls it, gives it the three numbers without the compiler's own first argument
+fma = cast(Callable[[float, float, float], float], intrinsic(_fma))

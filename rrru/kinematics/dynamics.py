@@ -19,11 +19,20 @@ of the loads at the platform; a forearm's own rotation is neglected. On a base t
 is g - w x g in the robot's frame. Lengths mm, angles rad, forces N, torques N mm, masses kg, times s.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rrru.kinematics.legs import cross
+from rrru.kinematics.arrays import FloatArray, IntArray
+from rrru.kinematics.chain import EndEffectorPoses, Poses
+from rrru.kinematics.legs import Legs, cross
+from rrru.kinematics.parameter_jacobian import TwistMap
+from rrru.kinematics.point_masses import DriveMotion
+
+if TYPE_CHECKING:
+    from rrru.kinematics.robot import Robot
 
 GRAVITY_MM_S2 = 9806.65
 # kg mm / s^2 in a newton
@@ -41,7 +50,9 @@ class Masses:
     arm_kg: float = 2.0
 
 
-def drive_rates(mechanism, position_mm, velocity_mm_s, acceleration_mm_s2):
+def drive_rates(
+    mechanism: "Robot", position_mm: FloatArray, velocity_mm_s: FloatArray, acceleration_mm_s2: FloatArray
+) -> tuple[FloatArray, FloatArray]:
     """Rates (n, 3) and accelerations (n, 3) of the actuator values, per s and per s^2, from the platform's (n, 3).
 
     Both are NaN where position or velocity are; where only the platform's acceleration is NaN, only the drives' is.
@@ -60,17 +71,17 @@ def drive_rates(mechanism, position_mm, velocity_mm_s, acceleration_mm_s2):
     return (after - before) / (2.0 * h), np.where(known, second, np.nan)
 
 
-def gravity(robot):
+def gravity(robot: "Robot") -> FloatArray:
     """Acceleration of gravity (3,) in mm/s^2 in the robot's frame."""
     return -GRAVITY_MM_S2 * np.asarray(robot.up)
 
 
-def level_axes(robot):
+def level_axes(robot: "Robot") -> IntArray:
     """Numbers (2,) of the axes of a robot's frame that are the most level."""
     return np.sort(np.argsort(np.abs(robot.up), kind="stable")[:2])
 
 
-def arm_load(masses, arm_mm, pulls, acceleration):
+def arm_load(masses: Masses, arm_mm: float, pulls: FloatArray, acceleration: FloatArray) -> FloatArray:
     """Torques (n, k) in N mm of the arms' own masses and half forearms on drives that turn level arms.
 
     pulls (n, k): gravity in mm/s^2 along the path of the arms' ends; acceleration (n, k): of the drives.
@@ -89,18 +100,26 @@ class Loads:
     frames; base (n, 3): moments in N mm about the robot's origin.
     """
 
-    member_n: np.ndarray
-    held_n: np.ndarray
-    drive: np.ndarray
-    followers: np.ndarray
-    across: np.ndarray
-    base: np.ndarray
+    member_n: FloatArray
+    held_n: FloatArray
+    drive: FloatArray
+    followers: FloatArray
+    across: FloatArray
+    base: FloatArray
 
-    def __add__(self, other):
+    def __add__(self, other: "Loads") -> "Loads":
         return Loads(*(getattr(self, one.name) + getattr(other, one.name) for one in fields(Loads)))
 
 
-def loads(robot, masses, at, actuators, drive_motion, acceleration_mm_s2, payload_kg):
+def loads(
+    robot: "Robot",
+    masses: Masses,
+    at: TwistMap,
+    actuators: FloatArray,
+    drive_motion: tuple[FloatArray, FloatArray],
+    acceleration_mm_s2: FloatArray,
+    payload_kg: FloatArray,
+) -> Loads:
     """Loads of a motion; at: TwistMap of its poses at actuators (n, K); drive_motion: rates and accelerations (n, K) of
     the drives; payload_kg (n,).
 
@@ -111,7 +130,14 @@ def loads(robot, masses, at, actuators, drive_motion, acceleration_mm_s2, payloa
     return _of_platform(robot, at, force) + _of_parts(robot, masses, at, motion, gravity(robot))
 
 
-def load_slopes(robot, masses, at, actuators, acceleration_mm_s2, payload_kg):
+def load_slopes(
+    robot: "Robot",
+    masses: Masses,
+    at: TwistMap,
+    actuators: FloatArray,
+    acceleration_mm_s2: FloatArray,
+    payload_kg: FloatArray,
+) -> tuple[Loads, ...]:
     """Derivatives of `loads`: by the platform's mass in kg, by the tilt of the base about each level axis, and by
     mass and each of these tilts.
 
@@ -129,12 +155,12 @@ def load_slopes(robot, masses, at, actuators, acceleration_mm_s2, payload_kg):
     return by_mass, *by_tilt, *per_kg
 
 
-def carried_kg(robot, masses, payload_kg):
+def carried_kg(robot: "Robot", masses: Masses, payload_kg: FloatArray) -> FloatArray:
     """Masses (n,) at the platform: its own, payload_kg (n,) and its half of the forearms."""
     return masses.platform_kg + np.asarray(payload_kg, dtype=float) + 0.5 * len(robot.parts.members) * masses.forearm_kg
 
 
-def _of_platform(robot, at, force):
+def _of_platform(robot: "Robot", at: TwistMap, force: FloatArray) -> Loads:
     """The Loads of forces (n, 3) in N at the platform."""
     member = _along_members(robot, at, np.concatenate([force, cross(at.point_mm, force)], axis=1))
     held = _held(robot, at, force) if robot.parts.held_from else member
@@ -142,7 +168,7 @@ def _of_platform(robot, at, force):
     return _with_followers(robot, driven, member, held, _across(robot, at, force), cross(at.point_mm, force))
 
 
-def _of_parts(robot, masses, at, motion, gravity_mm_s2):
+def _of_parts(robot: "Robot", masses: Masses, at: TwistMap, motion: DriveMotion, gravity_mm_s2: FloatArray) -> Loads:
     """The Loads of all moving masses except the platform's.
 
     motion: values, rates and accelerations (n, K) of the drives.
@@ -153,17 +179,20 @@ def _of_parts(robot, masses, at, motion, gravity_mm_s2):
     member, driven = (np.broadcast_to(load, (count, size)) for load, size in zip((member, driven), sizes, strict=True))
     held = np.zeros((count, 3)) if robot.parts.held_from else member
     base = robot.own_base_moment(motion, at.poses, gravity_mm_s2)
-    return _with_followers(robot, driven, member, held, _own_across(robot, at, motion, gravity_mm_s2), base)
+    across = _own_across(robot, at, motion, gravity_mm_s2)
+    return _with_followers(robot, driven, member, held, across, np.broadcast_to(base, (count, 3)))
 
 
-def _with_followers(robot, driven, member, held, across, base):
+def _with_followers(
+    robot: "Robot", driven: FloatArray, member: FloatArray, held: FloatArray, across: FloatArray, base: FloatArray
+) -> Loads:
     """The Loads with loads (n, D) on all driven values."""
-    numbers = {joint.name: joint.drive for joint in robot.legs.joints}
+    numbers = {joint.name: joint.drive for joint in robot.legs.joints if joint.drive is not None}
     followers = [numbers[one.site] for one in robot.parts.followers]
     return Loads(member, held, robot.legs.per_actuator(driven), driven[:, followers], across, base)
 
 
-def _across(robot, at, force):
+def _across(robot: "Robot", at: TwistMap, force: FloatArray) -> FloatArray:
     """Moments (n, J, 3) across the axes of an arm's turning joints under forces (n, 3) of the platform."""
     names = robot.legs.arm_joints
     if not names:
@@ -173,7 +202,7 @@ def _across(robot, at, force):
     return _across_axes(robot, turns, moment)
 
 
-def _own_across(robot, at, motion, gravity_mm_s2):
+def _own_across(robot: "Robot", at: TwistMap, motion: DriveMotion, gravity_mm_s2: FloatArray) -> FloatArray:
     """The same under an arm's own masses."""
     if not robot.legs.arm_joints:
         return np.zeros((len(at), 0, 3))
@@ -181,26 +210,28 @@ def _own_across(robot, at, motion, gravity_mm_s2):
     return _across_axes(robot, turns, robot.own_moments(motion, at.poses, gravity_mm_s2, places))
 
 
-def _joint_frames(robot, at):
+def _joint_frames(robot: "Robot", at: TwistMap) -> tuple[FloatArray, FloatArray]:
     """Turns (n, J, 3, 3) and places (n, J, 3) of an arm's turning joints."""
     frames = (at.frames[robot.legs.site_numbers[name]] for name in robot.legs.arm_joints)
-    return tuple(np.stack(parts, axis=1) for parts in zip(*frames, strict=True))
+    turns, places = (np.stack(parts, axis=1) for parts in zip(*frames, strict=True))
+    return turns, places
 
 
-def _across_axes(robot, turns, moment):
+def _across_axes(robot: "Robot", turns: FloatArray, moment: FloatArray | float) -> FloatArray:
     """Components across the axes of moments (n, J, 3) about an arm's turning joints, in the joints' frames."""
     axes = np.stack([joint.axis for joint in robot.legs.joints if joint.name in robot.legs.arm_joints])
     in_joint = np.einsum("njab,nja->njb", turns, np.broadcast_to(moment, turns.shape[:3]))
-    return in_joint - (in_joint * axes).sum(axis=-1, keepdims=True) * axes
+    return np.asarray(in_joint - (in_joint * axes).sum(axis=-1, keepdims=True) * axes)
 
 
-def _carrying(legs, poses, names):
+def _carrying(legs: Legs, poses: Poses, names: Sequence[str]) -> FloatArray:
     """1 where the arm of some joints carries the platform of n poses, 0 where another arm does: (n, J, 1)."""
     on = np.array([[name in {joint.name for joint in leg.joints} for name in names] for leg in legs.legs], dtype=float)
-    return on[poses.leg if legs.hands else np.zeros(len(poses.closed), dtype=int)][:, :, None]
+    leg = poses.leg if isinstance(poses, EndEffectorPoses) else np.zeros(len(poses.closed), dtype=int)
+    return np.asarray(on[leg][:, :, None])
 
 
-def _along_members(robot, at, load):
+def _along_members(robot: "Robot", at: TwistMap, load: FloatArray) -> FloatArray:
     """Forces (n, members) along the members under loads (n, 6) of the platform."""
     numbers, wrenches = robot.legs.site_numbers, at.wrenches(load)
     owner = {
@@ -213,7 +244,7 @@ def _along_members(robot, at, load):
     return result
 
 
-def _held(robot, at, force):
+def _held(robot: "Robot", at: TwistMap, force: FloatArray) -> FloatArray:
     """Forces (n, 3) of three legs whose inner joint friction holds, under forces (n, 3) of the platform.
 
     A free inner joint lets a leg push along its last link only. Held, it makes one two-force member of both its links,
@@ -223,4 +254,4 @@ def _held(robot, at, force):
     pairs = zip(robot.parts.held_from, (site for (site,) in robot.parts.members), strict=True)
     line = np.stack([at.frames[numbers[far]][1] - at.frames[numbers[near]][1] for near, far in pairs], axis=1)
     line /= np.linalg.norm(line, axis=-1, keepdims=True)
-    return -np.linalg.solve(line.transpose(0, 2, 1), force[..., None])[..., 0]
+    return np.asarray(-np.linalg.solve(line.transpose(0, 2, 1), force[..., None])[..., 0], dtype=float)

@@ -7,15 +7,19 @@ identifiable and left out; `gauge` states which combination replaces it. With a 
 parameters that are identifiable at its poses. Lengths in mm, angles in rad.
 """
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from rrru.errors import ConfigError
 from rrru.kinematics import base_parameters
+from rrru.kinematics.arrays import BoolArray, FloatArray
 from rrru.kinematics.base_parameters import (
+    Candidate,
     MeasurementConfig,
     candidates_of,
     choose,
@@ -24,10 +28,14 @@ from rrru.kinematics.base_parameters import (
     offered,
     open_numbers,
 )
+from rrru.kinematics.chain import PoseGuess, Poses
+from rrru.kinematics.dynamics import Masses
 from rrru.kinematics.inverse import bar_lengths, drives_from_home, end_of, followed, in_range, near_or_followed
-from rrru.kinematics.legs import TOOL, WORLD, Legs, Parts
-from rrru.kinematics.point_masses import base_moment, driven_loads, member_forces, moments
+from rrru.kinematics.legs import TOOL, WORLD, Leg, Legs, Parts
+from rrru.kinematics.point_masses import DriveMotion, PointMass, base_moment, driven_loads, member_forces, moments
+from rrru.kinematics.readings import Readings
 from rrru.kinematics.robot import Robot
+from rrru.parameters import ParameterSet
 
 SETS = ("frame", "zero", "full")
 # poses over which parameters have to be separable, their tilt, and the independent share of a column that is needed
@@ -49,35 +57,35 @@ class GeneralRobot(Robot):
     name: str
     legs: Legs
     parts: Parts
-    drive_range: np.ndarray
+    drive_range: FloatArray
     angle_arm_mm: float = 500.0
     parameter_set: str = "zero"
     angle_limit_rad: float = 0.1
     length_limit_mm: float = 30.0
     tool_mm: tuple[float, float, float] = (0.0, 0.0, 0.0)
     up: tuple[float, float, float] = (0.0, 0.0, 1.0)
-    point_masses: tuple = ()
+    point_masses: tuple[PointMass, ...] = ()
     assumed: frozenset[str] = frozenset()
-    sample: tuple | None = None
+    sample: tuple[FloatArray, FloatArray, Readings | None] | None = None
     among: tuple[str, ...] = ()
     reads: MeasurementConfig = field(default_factory=MeasurementConfig)
-    effort_limits: np.ndarray | None = None
-    velocity_limits: np.ndarray | None = None
+    effort_limits: FloatArray | None = None
+    velocity_limits: FloatArray | None = None
 
     TRACKED = RICHEST = "full"
     SEARCHED = ""  # an objective that is not compiled is too slow for a genetic algorithm
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if self.parameter_set not in SETS:
             raise ConfigError(f"{self.name}: parameter_set is {self.parameter_set!r}; allowed: {', '.join(SETS)}")
 
     @cached_property
-    def candidates(self):
+    def candidates(self) -> tuple[Candidate, ...]:
         """All Candidates, see `rrru.kinematics.base_parameters`."""
         return candidates_of(self.legs, self.parts, self.reads)
 
     @cached_property
-    def _chosen(self):
+    def _chosen(self) -> tuple[tuple[Candidate, ...], dict[str, FloatArray]]:
         """Chosen Candidates, and by name the combination of chosen ones (k,) that each other one is confounded with."""
         wanted = self._wanted
         if self.parameter_set != "full" and not self.sample:
@@ -100,19 +108,19 @@ class GeneralRobot(Robot):
         return tuple(candidates[k] for k in chosen), replaced
 
     @property
-    def offered(self):
+    def offered(self) -> BoolArray:
         """Which components (sites, 6) of constant twists its parameters are chosen from."""
         return offered(self.legs, self._wanted)
 
     @cached_property
-    def _wanted(self):
+    def _wanted(self) -> tuple[Candidate, ...]:
         """The Candidates that the set is chosen from."""
         if self.parameter_set == "full":
             return self.candidates
         drives = self.candidates[: len(self.parts.drives)] if self.parameter_set == "zero" else ()
         return (*drives, *open_numbers(self.reads))
 
-    def _workspace(self):
+    def _workspace(self) -> tuple[FloatArray, FloatArray]:
         """Actuator values (n, K) spread over the drives' ranges and positions (n, 3) near those of the tool."""
         generator = np.random.default_rng(0)
         if self._bars_only:
@@ -128,19 +136,19 @@ class GeneralRobot(Robot):
         return actuators, np.tile(self.legs.home_mm, (_POSES, 1))
 
     @cached_property
-    def parameters(self):
+    def parameters(self) -> ParameterSet:
         """The parameters of the chosen set, nominally zero."""
         return base_parameters.bounded(self._chosen[0], {"mm": self.length_limit_mm, "rad": self.angle_limit_rad})
 
     @cached_property
-    def gauge(self):
+    def gauge(self) -> dict[str, str]:
         """By name of a not identifiable parameter the combination that replaces it, such as "0.71 base1_x - 0.2 dl1".
 
         "nothing" where it has no effect on the readings.
         """
         return {left: in_words(combination, self.parameters.names) for left, combination in self._chosen[1].items()}
 
-    def confounded_outside(self, name):
+    def confounded_outside(self, name: str) -> tuple[tuple[Candidate, float], ...]:
         """Candidates of frame, tool and reflectors confounded with a parameter, and its size for a unit of each."""
         names, (_, replaced) = self.parameters.names, self._chosen
         outside = self._outside
@@ -150,33 +158,33 @@ class GeneralRobot(Robot):
         return tuple((known[left], size) for left, size in sizes.items() if left in known and size)
 
     @property
-    def _outside(self):
+    def _outside(self) -> set[str]:
         """Sites that are no part of the robot."""
         return {WORLD, TOOL, *self.legs.reflectors}
 
     @property
-    def stages(self):
+    def stages(self) -> tuple[BoolArray, ...]:
         """Frame, tool and reflectors, and then with them the drives."""
         return base_parameters.stages(self._chosen[0], self._outside)
 
     @cached_property
-    def directions(self):
+    def directions(self) -> FloatArray:
         """Twists (sites, 6, p) that a unit of each parameter makes."""
         columns = [direction(self.legs, candidate)[..., None] for candidate in self._chosen[0]]
         return np.concatenate([np.zeros((len(self.legs.sites), 6, 0)), *columns], axis=-1)
 
     @property
-    def deviation_names(self):
+    def deviation_names(self) -> tuple[str, ...]:
         """Names of the deviations that `twists_of` knows: all Candidates."""
         return tuple(one.name for one in self.candidates)
 
-    def twists_of(self, values):
+    def twists_of(self, values: Mapping[str, float]) -> FloatArray:
         """Twists (1, sites, 6) of deviations by name."""
         known = {candidate.name: candidate for candidate in self.candidates}
         twists = [value * direction(self.legs, known[name]) for name, value in values.items()]
         return np.sum(twists, axis=0)[None] if twists else self.twists()
 
-    def identifiable(self, values):
+    def identifiable(self, values: dict[str, float]) -> dict[str, float]:
         """Mapping of the parameters from values of any Candidates: others count by what replaces them."""
         result = dict.fromkeys(self.parameters.names, 0.0)
         for name, value in values.items():
@@ -186,11 +194,11 @@ class GeneralRobot(Robot):
                 result[chosen.name] += share * value
         return result
 
-    def reading(self, reads):
+    def reading(self, reads: MeasurementConfig) -> Self:
         """The robot with a campaign's `rrru.kinematics.base_parameters.MeasurementConfig`."""
         return replace(self, legs=replace(self.legs, reflectors=reads.reflectors), reads=reads)
 
-    def seen_at(self, actuators, position_mm, readings=None):
+    def seen_at(self, actuators: FloatArray, position_mm: FloatArray, readings: Readings | None = None) -> Self:
         """The robot with its set reduced to the parameters identifiable at poses of a campaign, (n, K) and (n, 3).
 
         readings: what was read at these poses, by default positions of the tool. A second reduction, at poses of a part
@@ -201,28 +209,34 @@ class GeneralRobot(Robot):
         return replace(self, sample=sample, among=among)
 
     @property
-    def reach_mm(self):
+    def reach_mm(self) -> float:
         """Upper bound of how far the tool can get from the foot of the leg that takes it farthest."""
         return self._longest_mm(1)
 
     @property
-    def orients(self):
+    def orients(self) -> bool:
         """Whether its drives can orient its platform besides moving it."""
         return self.freedoms[1] > 0
 
     @property
-    def size_mm(self):
+    def size_mm(self) -> float:
         """Upper bound of how far the tool can get from the origin."""
         return self._longest_mm(0)
 
     farthest_mm = size_mm  # searching for it would take the inverse of many points
 
-    def _longest_mm(self, first):
+    def _longest_mm(self, first: int) -> float:
         """Length of the longest leg from its joint of this number on, slides and bars out, to the tool."""
         travel = np.abs(np.asarray(self.drive_range, dtype=float)).max(axis=1)
         return self.legs.longest_mm(first, travel) + float(np.linalg.norm(self.tool_mm))
 
-    def inverse(self, position_mm, deviations=None, elbow="out", turn=None):
+    def inverse(
+        self,
+        position_mm: FloatArray,
+        deviations: FloatArray | None = None,
+        elbow: str = "out",
+        turn: FloatArray | None = None,
+    ) -> FloatArray:
         """Actuator values (n, K) for positions (n, 3) of the tool; NaN where Newton from home does not converge.
 
         Under deviations positions are met as nearly as the drives can. turn (n, 3, 3): the platform's orientation, by
@@ -236,16 +250,16 @@ class GeneralRobot(Robot):
         return drives_from_home(self, (position, wanted), twists, deviations is not None)
 
     @property
-    def strokes(self):
+    def strokes(self) -> FloatArray:
         """Widths (K,) of the drives' ranges, NaN where none is stated."""
         stated = [column not in self.assumed for column in self.parts.columns]
         return np.where(stated, np.ptp(np.asarray(self.drive_range, dtype=float), axis=1), np.nan)
 
-    def in_range(self, actuators):
+    def in_range(self, actuators: FloatArray) -> FloatArray:
         """Actuator values (n, K), those of turning drives by whole turns within their ranges; NaN outside of these."""
         return in_range(self, np.asarray(actuators, dtype=float))
 
-    def unreached(self, values, as_home=True):
+    def unreached(self, values: FloatArray, as_home: bool = True) -> str:
         """What keeps the robot from a point: a drive's range where only some of the values (K,) are NaN.
 
         as_home: whether its platform was to be turned as in the home pose.
@@ -254,37 +268,41 @@ class GeneralRobot(Robot):
         where = "out of reach" if len(names) == len(values) else f"out of the range of {', '.join(names)}"
         return where + (", with the platform turned as in the home pose" if self.orients and as_home else "")
 
-    def own_load(self, _masses, motion, poses, gravity_mm_s2):
+    def own_load(
+        self, _masses: Masses, motion: DriveMotion, poses: Poses, gravity_mm_s2: FloatArray
+    ) -> FloatArray | float:
         """Loads (n, D) on the driven values, in N mm or N, of the robot's point masses; see
         `rrru.kinematics.point_masses`.
         """
         return driven_loads(self, motion, poses, gravity_mm_s2) if self.point_masses else 0.0
 
-    def own_member_forces(self, motion, poses, gravity_mm_s2):
+    def own_member_forces(self, motion: DriveMotion, poses: Poses, gravity_mm_s2: FloatArray) -> FloatArray | float:
         """Forces (n, members) in N of the robot's point masses on its members, compression positive."""
         return member_forces(self, motion, poses, gravity_mm_s2) if self.point_masses else 0.0
 
-    def own_moments(self, motion, poses, gravity_mm_s2, at_mm):
+    def own_moments(
+        self, motion: DriveMotion, poses: Poses, gravity_mm_s2: FloatArray, at_mm: FloatArray
+    ) -> FloatArray | float:
         """Moments (n, J, 3) in N mm of an arm's point masses about the places (n, J, 3) of its turning joints."""
         return moments(self, motion, poses, gravity_mm_s2, at_mm) if self.point_masses else 0.0
 
-    def own_base_moment(self, motion, poses, gravity_mm_s2):
+    def own_base_moment(self, motion: DriveMotion, poses: Poses, gravity_mm_s2: FloatArray) -> FloatArray | float:
         """Moments (n, 3) in N mm of the robot's point masses about the origin."""
         return base_moment(self, motion, poses, gravity_mm_s2) if self.point_masses else 0.0
 
     @property
-    def workspace_lines(self):
+    def workspace_lines(self) -> int:
         """Grid lines over its reach: fewer where every point's inverse takes a search."""
-        return Robot.workspace_lines if self._bars_only else 30
+        return super().workspace_lines if self._bars_only else 30
 
     @property
-    def _bars_only(self):
+    def _bars_only(self) -> bool:
         """Whether every drive is a bar's length."""
         bars = [leg.bar.drive for leg in self.legs.legs if leg.bar]
         return None not in bars and len(bars) == len(self.parts.drives) and self.legs.coupling is None
 
     @cached_property
-    def freedoms(self):
+    def freedoms(self) -> tuple[int, int]:
         """Degrees of freedom of the tool's position, and in addition of the platform's orientation, by the drives."""
         actuators, position = (part[:10] for part in self._workspace())
         poses = self.solve(actuators, position)
@@ -295,19 +313,19 @@ class GeneralRobot(Robot):
         return int(position_rank), int(pose_rank - position_rank)
 
     @cached_property
-    def _driven_leg(self):
+    def _driven_leg(self) -> Leg | None:
         """A leg that is all driven, whose end is the platform's place; None where there is none."""
         legs = (leg for leg in self.legs.legs if not leg.bar and not any(joint.passive for joint in leg.joints))
         return next(legs, None)
 
-    def near(self, position_mm, actuators):
+    def near(self, position_mm: FloatArray, actuators: FloatArray) -> PoseGuess:
         """Poses near which the legs close: of a leg that is all driven its own end, else upright or followed."""
         actuators = np.asarray(actuators, dtype=float)
         if self._driven_leg:
             return end_of(self.legs, self._driven_leg, actuators)
         return near_or_followed(self, actuators, super().near(position_mm, actuators))
 
-    def guess(self, actuators, targets=None):
+    def guess(self, actuators: FloatArray, targets: Sequence[str] | None = None) -> FloatArray:
         """Positions (n, 3) of the tool at actuator values (n, K): a driven leg's end, or followed from home.
 
         The home position where they are lost.

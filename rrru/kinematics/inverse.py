@@ -1,10 +1,21 @@
 """Inverse kinematics of a general robot: Newton continuation, lengths of driven bars. Lengths in mm, angles in rad."""
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from rrru.cache import last_cached
-from rrru.kinematics.chain import Poses, Twists, bar_pose, walk
+from rrru.kinematics.arrays import BoolArray, FloatArray
+from rrru.kinematics.chain import PoseGuess, Twists, bar_pose, walk
+from rrru.kinematics.legs import Leg, Legs
+from rrru.kinematics.parameter_jacobian import TwistMap
+
+if TYPE_CHECKING:
+    from rrru.kinematics.general_robot import GeneralRobot
+
+# positions (n, 3) and orientations (n, 3, 3)
+Place = tuple[FloatArray, FloatArray]
 
 # an inverse has at most so many steps. The longest step is a share of a drive's range, or of a turn if that is less:
 # longer ones end in other assemblies or do not converge
@@ -19,14 +30,16 @@ _SLACK = 1e-6
 _CLOSE = 0.1
 
 
-def drives_from_home(robot, place, twists, nearest):
+def drives_from_home(robot: "GeneralRobot", place: Place, twists: FloatArray, nearest: bool) -> FloatArray:
     """`inverse_kinematics` near the home pose."""
     count, legs = len(place[0]), robot.legs
     start = np.tile(legs.home_drives, (count, 1)).astype(float), np.tile(legs.home_mm, (count, 1))
     return inverse_kinematics(robot, place, start, twists, nearest)
 
 
-def inverse_kinematics(robot, place, start, twists, nearest=True):
+def inverse_kinematics(
+    robot: "GeneralRobot", place: Place, start: tuple[FloatArray, FloatArray], twists: FloatArray, nearest: bool = True
+) -> FloatArray:
     """Actuator values (n, K) of a robot at places of its tool, under twists (n or 1, sites, 6); NaN where it has none.
 
     place: positions (n, 3) of the tool and orientations (n, 3, 3) of the platform, met where the drives can choose
@@ -65,17 +78,17 @@ def inverse_kinematics(robot, place, start, twists, nearest=True):
 
 
 @last_cached
-def followed(robot, actuators):
+def followed(robot: "GeneralRobot", actuators: FloatArray) -> PoseGuess:
     """Poses (n) at actuator values (n, K), followed in short steps of the drives from the home pose; NaN where lost."""
     legs, n = robot.legs, len(actuators)
     turn, passive = np.broadcast_to(legs.home_turn, (n, 3, 3)), np.tile(legs.home_passive, (n, 1))
-    poses = Poses(np.tile(legs.home_mm, (n, 1)), turn, passive, None, None)
+    poses: PoseGuess = PoseGuess(np.tile(legs.home_mm, (n, 1)), turn, passive)
     for share in np.linspace(0.0, 1.0, _steps_from_home(robot, actuators) + 1)[1:]:
         poses = robot.model.solve(legs.home_drives + share * (actuators - legs.home_drives), poses)
     return poses
 
 
-def near_or_followed(robot, actuators, near):
+def near_or_followed(robot: "GeneralRobot", actuators: FloatArray, near: PoseGuess) -> PoseGuess:
     """Poses (n) from which to search at actuator values (n, K): `near`, or those followed from home if close to it.
 
     Passive joints far from home are not known from the platform's place alone.
@@ -88,13 +101,13 @@ def near_or_followed(robot, actuators, near):
     return poses.where(close, near)
 
 
-def _steps_from_home(robot, actuators):
+def _steps_from_home(robot: "GeneralRobot", actuators: FloatArray) -> int:
     """Number of the steps in which drives may go from home to actuator values (n, K), at least one."""
     away = np.abs(actuators - robot.legs.home_drives) / _widths(robot)
     return max(1, int(np.ceil(np.nanmax(away, initial=0.0) / _LONGEST_STEP)))
 
 
-def _widths(robot):
+def _widths(robot: "GeneralRobot") -> FloatArray:
     """Width (K,) of each drive's range, at most one turn of a turning drive; a turn where no range is known."""
     turning = np.array(robot.parts.units) == "rad"
     width = np.minimum(np.ptp(robot.drive_range, axis=1), np.where(turning, 2.0 * np.pi, np.inf))
@@ -102,7 +115,7 @@ def _widths(robot):
     return np.where((width > 0.0) & np.isfinite(width), width, turn)
 
 
-def in_range(robot, actuators):
+def in_range(robot: "GeneralRobot", actuators: FloatArray) -> FloatArray:
     """Actuator values (n, K), those of turning drives whole turns further where their ranges want it; NaN outside."""
     legs, slack = robot.legs, _SLACK * _widths(robot)
     low, high = np.asarray(robot.drive_range, dtype=float).T + np.outer([-1.0, 1.0], slack)
@@ -117,7 +130,9 @@ def in_range(robot, actuators):
     return np.where(beyond & ~((low <= result) & (result <= high)), np.nan, result)
 
 
-def drive_step(at, ranks, lack_mm, turning_rad, widths):
+def drive_step(
+    at: TwistMap, ranks: tuple[int, int], lack_mm: FloatArray, turning_rad: FloatArray, widths: FloatArray
+) -> tuple[FloatArray, FloatArray, BoolArray]:
     """Changes (n, K) of the actuator values that remove errors of position (n, 3) and, if possible, of turn (n, 3).
 
     ranks: degrees of freedom of the point's position and, in addition, of the platform's orientation by the drives;
@@ -138,7 +153,7 @@ def drive_step(at, ranks, lack_mm, turning_rad, widths):
     return (step + more)[:, :, 0], held, stretched | aligned
 
 
-def _inverse_of_rank(matrices, rank, unprojected):
+def _inverse_of_rank(matrices: FloatArray, rank: int, unprojected: FloatArray) -> tuple[FloatArray, BoolArray]:
     """Pseudo-inverses (n, k, j) of matrices (n, j, k) by their largest `rank` singular values, and which (n,) lack one.
 
     unprojected: matrices (n, j, k) of which these are projections; singular values negligible next to them are left
@@ -151,19 +166,19 @@ def _inverse_of_rank(matrices, rank, unprojected):
     return (vt[:, :rank].transpose(0, 2, 1) * shares[:, None]) @ u[:, :, :rank].transpose(0, 2, 1), lost.any(axis=1)
 
 
-def end_of(legs, leg, actuators):
+def end_of(legs: Legs, leg: Leg, actuators: FloatArray) -> PoseGuess:
     """Poses (n) at which a leg ends whose joints are all driven, at actuator values (n, K)."""
     passive = np.zeros((len(actuators), len(legs.passive_joints)))
     way = walk(legs, leg, actuators, passive, Twists(legs))
-    return Poses(way.place, way.turn, passive, None, None)
+    return PoseGuess(way.place, way.turn, passive)
 
 
-def bar_lengths(legs, drive_range, place, twists):
+def bar_lengths(legs: Legs, drive_range: FloatArray, place: Place, twists: FloatArray) -> FloatArray:
     """Lengths (n, K) of driven bars at places of the platform, NaN where one is outside of its range (K, 2).
 
     place: its positions (n, 3) and orientations (n, 3, 3); twists (n or 1, sites, 6).
     """
-    poses = Poses(*place, np.zeros((len(place[0]), 0)), None, None)
+    poses = PoseGuess(*place, np.zeros((len(place[0]), 0)))
     none, given = np.zeros((len(place[0]), len(drive_range))), Twists(legs, twists)
     needed = none.copy()
     for leg in legs.legs:

@@ -16,8 +16,10 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from rrru.errors import ConfigError
+from rrru.kinematics.arrays import FloatArray, IntArray
 
 WORLD, TOOL = "world", "tool"
 X, Y, Z = np.eye(3)
@@ -35,18 +37,18 @@ class Joint:
 
     name: str
     kind: str = "fixed"
-    axis: np.ndarray = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
-    shift_mm: np.ndarray = field(default_factory=lambda: _NO_SHIFT)
-    turn: np.ndarray = field(default_factory=lambda: _NO_TURN)
+    axis: FloatArray = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
+    shift_mm: FloatArray = field(default_factory=lambda: _NO_SHIFT)
+    turn: FloatArray = field(default_factory=lambda: _NO_TURN)
     drive: int | None = None
     home: float = 0.0
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if self.kind not in ("R", "P", "fixed"):
             raise ConfigError(f"joint {self.name}: its kind is {self.kind!r}; allowed: R, P, fixed")
 
     @property
-    def passive(self):
+    def passive(self) -> bool:
         """Whether its value follows from the others."""
         return self.kind != "fixed" and self.drive is None
 
@@ -59,7 +61,7 @@ class Bar:
     """
 
     length_mm: float
-    platform_mm: np.ndarray
+    platform_mm: FloatArray
     drive: int | None = None
 
 
@@ -72,11 +74,11 @@ class Leg:
 
     name: str
     joints: tuple[Joint, ...]
-    end_turn: np.ndarray = field(default_factory=lambda: _NO_TURN)
+    end_turn: FloatArray = field(default_factory=lambda: _NO_TURN)
     bar: Bar | None = None
 
     @property
-    def bar_sites(self):
+    def bar_sites(self) -> tuple[str, ...]:
         """Names of the bar's site, whose x runs along it towards the platform, and of its end, in the platform's frame.
 
         Empty without a bar.
@@ -92,9 +94,9 @@ class Chain(NamedTuple):
     passive values (k,) followed by driven ones (D,), -1 for a fixed joint.
     """
 
-    frames: np.ndarray
-    motions: np.ndarray
-    numbers: np.ndarray
+    frames: FloatArray
+    motions: FloatArray
+    numbers: IntArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,15 +110,15 @@ class Legs:
     """
 
     legs: tuple[Leg, ...]
-    home_drives: np.ndarray
-    home_mm: np.ndarray = field(default_factory=lambda: _NO_SHIFT)
-    home_turn: np.ndarray = field(default_factory=lambda: _NO_TURN)
+    home_drives: FloatArray
+    home_mm: FloatArray = field(default_factory=lambda: _NO_SHIFT)
+    home_turn: FloatArray = field(default_factory=lambda: _NO_TURN)
     reflectors: tuple[str, ...] = ()
-    coupling: np.ndarray | None = None
+    coupling: FloatArray | None = None
     hands: tuple[tuple[str, ...], ...] = ()
 
-    def __post_init__(self):
-        owner = {}
+    def __post_init__(self) -> None:
+        owner: dict[str, tuple[Joint, tuple[Joint, ...]]] = {}
         for leg in self.legs:
             for number, joint in enumerate(leg.joints):
                 before = leg.joints[:number]
@@ -127,65 +129,64 @@ class Legs:
             raise ConfigError(f"the coupling has {rows}; allowed: one each")
 
     @property
-    def arm_joints(self):
+    def arm_joints(self) -> tuple[str, ...]:
         """Names of the turning joints of an arm (one leg without a bar) or of arms with separate ends; else none."""
         if (len(self.legs) > 1 and not self.hands) or self.legs[0].bar:
             return ()
         return tuple(joint.name for joint in self.joints if joint.kind == "R")
 
     @cached_property
-    def joints(self):
+    def joints(self) -> tuple[Joint, ...]:
         """All joints, each once, in the order of the legs."""
         return tuple({joint.name: joint for leg in self.legs for joint in leg.joints}.values())
 
     @cached_property
-    def passive_joints(self):
+    def passive_joints(self) -> tuple[Joint, ...]:
         """The passive joints: the meaning of every vector of passive values."""
         return tuple(joint for joint in self.joints if joint.passive)
 
     @cached_property
-    def driven_kinds(self):
+    def driven_kinds(self) -> tuple[str, ...]:
         """Kind of every driven value, "R" or "P"."""
-        kinds = {joint.drive: joint.kind for joint in self.joints} | {
-            leg.bar.drive: "P" for leg in self.legs if leg.bar
-        }
-        return tuple(kinds[drive] for drive in sorted(set(kinds) - {None}))
+        kinds = {joint.drive: joint.kind for joint in self.joints if joint.drive is not None}
+        kinds |= {leg.bar.drive: "P" for leg in self.legs if leg.bar and leg.bar.drive is not None}
+        return tuple(kinds[drive] for drive in sorted(kinds))
 
-    def driven(self, actuators):
+    def driven(self, actuators: FloatArray) -> FloatArray:
         """Driven values (n, D) at actuator values (n, K)."""
         return actuators if self.coupling is None else actuators @ self.coupling.T
 
-    def per_actuator(self, columns):
+    def per_actuator(self, columns: FloatArray) -> FloatArray:
         """Columns (.., K) per actuator value from those (.., D) per driven value."""
         return columns if self.coupling is None else columns @ self.coupling
 
     @cached_property
-    def uncoupled(self):
+    def uncoupled(self) -> "Legs":
         """The legs with a drive of its own for every driven value."""
         return replace(self, coupling=None, home_drives=self.driven(self.home_drives))
 
     @cached_property
-    def sites(self):
+    def sites(self) -> tuple[str, ...]:
         """Names of all sites: world, then leg by leg the joints' seats, bar and end, then tool and its reflectors."""
         names = [name for leg in self.legs for name in (*(joint.name for joint in leg.joints), *leg.bar_sites)]
         return (WORLD, *dict.fromkeys(names), TOOL, *self.reflectors)
 
     @cached_property
-    def site_numbers(self):
+    def site_numbers(self) -> dict[str, int]:
         """Number of every site by its name."""
         return {name: number for number, name in enumerate(self.sites)}
 
     @cached_property
-    def passive_numbers(self):
+    def passive_numbers(self) -> dict[str, int]:
         """Number of every passive joint by its name."""
         return {joint.name: number for number, joint in enumerate(self.passive_joints)}
 
     @cached_property
-    def groups(self):
+    def groups(self) -> tuple[tuple[int, ...], ...]:
         """Numbers of the legs of each group: legs that share passive joints; all legs if they have separate ends."""
         if self.hands:
             return (tuple(range(len(self.legs))),)
-        result = []
+        result: list[list[int]] = []
         for number, leg in enumerate(self.legs):
             passive = {joint.name for joint in leg.joints if joint.passive}
             # shared joints precede the branching, so the first leg of a group has them as all others do
@@ -198,11 +199,11 @@ class Legs:
         return tuple(map(tuple, result))
 
     @cached_property
-    def chains(self):
+    def chains(self) -> dict[str, Chain]:
         """The Chain of every leg by its name."""
         return {leg.name: self._chain(leg) for leg in self.legs}
 
-    def _chain(self, leg):
+    def _chain(self, leg: Leg) -> Chain:
         """The Chain of a leg."""
         frames = [np.vstack([joint.turn.T, joint.shift_mm]) for joint in leg.joints]
         frames.append(np.vstack([leg.end_turn.T, _NO_SHIFT]))
@@ -210,18 +211,18 @@ class Legs:
         numbers = [(self.site_numbers[joint.name], self._column(joint)) for joint in leg.joints]
         return Chain(np.array(frames), np.reshape(motions, (-1, 6)), np.reshape(numbers, (-1, 2)).astype(np.int64))
 
-    def _column(self, joint):
+    def _column(self, joint: Joint) -> int:
         """Column of a joint's value in passive values followed by driven ones, -1 for a fixed joint."""
         if joint.kind == "fixed":
             return -1
-        return self.passive_numbers[joint.name] if joint.passive else len(self.passive_joints) + joint.drive
+        return self.passive_numbers[joint.name] if joint.drive is None else len(self.passive_joints) + joint.drive
 
     @property
-    def parallel(self):
+    def parallel(self) -> bool:
         """Whether every drive has a leg of its own, unlike those of arms."""
         return len(self.legs) >= len(self.driven_kinds)
 
-    def longest_mm(self, first, travel):
+    def longest_mm(self, first: int, travel: FloatArray) -> float:
         """Length of the longest leg from its joint of this number on, to the platform's frame.
 
         With its slides and its bar out as far as they go; travel (K,): the largest size of each actuator value.
@@ -229,17 +230,17 @@ class Legs:
         far = travel if self.coupling is None else np.abs(self.coupling) @ travel
         return float(max(self._length_mm(leg, first, far) for leg in self.legs))
 
-    def _length_mm(self, leg, first, far):
+    def _length_mm(self, leg: Leg, first: int, far: FloatArray) -> float:
         """Length of a leg from its joint of this number on, its driven values (D,) as far out as they go."""
         slides = sum(far[joint.drive] for joint in leg.joints if joint.kind == "P" and joint.drive is not None)
         length = sum(np.linalg.norm(joint.shift_mm) for joint in leg.joints[first:]) + slides
         if leg.bar is None:
-            return length
+            return float(length)
         driven = 0.0 if leg.bar.drive is None else far[leg.bar.drive]
-        return length + leg.bar.length_mm + driven + np.linalg.norm(leg.bar.platform_mm)
+        return float(length + leg.bar.length_mm + driven + np.linalg.norm(leg.bar.platform_mm))
 
     @property
-    def home_passive(self):
+    def home_passive(self) -> FloatArray:
         """Values (k,) of the passive joints from which searches start."""
         return np.array([joint.home for joint in self.passive_joints])
 
@@ -255,11 +256,11 @@ class Drive:
     column: str
     unit: str
     site: str
-    twist: np.ndarray
-    others: dict = field(default_factory=dict)
+    twist: FloatArray
+    others: dict[str, FloatArray] = field(default_factory=dict)
 
     @property
-    def twists(self):
+    def twists(self) -> dict[str, FloatArray]:
         """Twists (6,) per unit by site."""
         return {self.site: self.twist} | self.others
 
@@ -276,30 +277,30 @@ class Parts:
 
     drives: tuple[Drive, ...]
     feet: tuple[str, ...] = ()
-    links: dict = field(default_factory=dict)
+    links: dict[str, tuple[tuple[str, ...], ...]] = field(default_factory=dict)
     members: tuple[tuple[str, ...], ...] = ()
     held_from: tuple[str, ...] = ()
     followers: tuple[Drive, ...] = ()
 
     @property
-    def units(self):
+    def units(self) -> tuple[str, ...]:
         """Unit of every actuator value."""
         return tuple(drive.unit for drive in self.drives)
 
     @property
-    def columns(self):
+    def columns(self) -> list[str]:
         """Columns of the actuator values in tables."""
         return [drive.column for drive in self.drives]
 
 
-def unit_twist(component, factor=1.0):
+def unit_twist(component: int, factor: float = 1.0) -> FloatArray:
     """The twist (6,) of one component, shift along x, y, z in mm and turn about them in rad."""
     result = np.zeros(6)
     result[component] = factor
     return result
 
 
-def cross(first, second):
+def cross(first: FloatArray, second: FloatArray) -> FloatArray:
     """Cross products (.., 3) of vectors (.., 3): `np.cross` takes longer to look at them than to multiply."""
     result = np.empty(np.broadcast_shapes(np.shape(first), np.shape(second)))
     for k in range(3):
@@ -308,9 +309,9 @@ def cross(first, second):
     return result
 
 
-def turn_about(axis, angle_rad):
+def turn_about(axis: FloatArray, angle_rad: npt.ArrayLike) -> FloatArray:
     """Rotation matrices (..., 3, 3) about a unit axis (3,) by angles (...,)."""
     x, y, z = axis
     skew = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     angle = np.asarray(angle_rad, dtype=float)[..., None, None]
-    return _NO_TURN + np.sin(angle) * skew + (1.0 - np.cos(angle)) * (skew @ skew)
+    return np.asarray(_NO_TURN + np.sin(angle) * skew + (1.0 - np.cos(angle)) * (skew @ skew))

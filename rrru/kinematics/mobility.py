@@ -1,9 +1,13 @@
 """Mobility of a robot's platform with locked drives (null space of its constraints), in words. mm, rad."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
-from rrru.kinematics.chain import Poses, Twists, walks
+from rrru.kinematics.arrays import FloatArray
+from rrru.kinematics.chain import PoseGuess, Twists, walks
 from rrru.kinematics.closure_kernel import ARM_MM
+from rrru.kinematics.legs import Legs
 from rrru.kinematics.wrenches import by_group, spare_joints, wrenches_of
 
 # singular values below this share of the largest are none
@@ -11,7 +15,7 @@ _NONE = 1e-6
 _SCALE = np.repeat([ARM_MM, 1.0], 3)
 
 
-def free_motions(legs, up=(0.0, 0.0, 1.0)):
+def free_motions(legs: Legs, up: Sequence[float] | FloatArray = (0.0, 0.0, 1.0)) -> list[str]:
     """The motions in words, at the home pose of Legs, such as "turn about the vertical axis through the platform"."""
     free = _free_twists(legs)
     # at the platform's centre: shifts, turns about it, then the remaining screws
@@ -24,23 +28,23 @@ def free_motions(legs, up=(0.0, 0.0, 1.0)):
     return words + [_screw(one, legs.home_mm, up) for one in left]
 
 
-def _free_twists(legs):
+def _free_twists(legs: Legs) -> FloatArray:
     """Twists (k, 6) at the world's origin, lengths counted in the arm, that no leg resists."""
     twists, actuators = Twists(legs), legs.home_drives[None]
-    home = Poses(legs.home_mm[None], legs.home_turn[None], legs.home_passive[None], None, None)
+    home = PoseGuess(legs.home_mm[None], legs.home_turn[None], legs.home_passive[None])
     ways = walks(legs, actuators, home, twists)
     rows = by_group(legs, wrenches_of(legs, spare_joints(legs), ways))
     wrenches = np.concatenate([np.zeros((6, 6)), *(one[0] for one in rows)]) * _SCALE
     _, size, vectors = np.linalg.svd(wrenches / np.maximum(np.linalg.norm(wrenches, axis=1, keepdims=True), 1e-300))
-    return vectors[size <= _NONE * size[0]]
+    return np.asarray(vectors[size <= _NONE * size[0]])
 
 
-def _without(twists, part):
+def _without(twists: FloatArray, part: slice) -> FloatArray:
     """Twists (m, 6) that span those of a space (k, 6) of which a part is zero, simple ones by elimination."""
     _, size, vectors = np.linalg.svd(np.concatenate([twists[:, part].T, np.zeros((len(twists), len(twists)))]))
     result = vectors[size < _NONE] @ twists
     for row in range(len(result)):
-        pivot, column = np.unravel_index(np.abs(result[row:]).argmax(), result[row:].shape)
+        pivot, column = (int(k) for k in np.unravel_index(np.abs(result[row:]).argmax(), result[row:].shape))
         result[[row, row + pivot]] = result[[row + pivot, row]]
         result[row] /= result[row, column]
         further = np.arange(len(result)) != row
@@ -48,7 +52,7 @@ def _without(twists, part):
     return result
 
 
-def _direction(vector, up):
+def _direction(vector: FloatArray, up: Sequence[float] | FloatArray) -> str:
     """A direction (3,) in words."""
     unit = vector / np.linalg.norm(vector)
     if abs(unit @ np.asarray(up)) > 1.0 - _NONE:
@@ -60,7 +64,7 @@ def _direction(vector, up):
     return "the direction ({:.3f}, {:.3f}, {:.3f})".format(*unit)
 
 
-def _screw(twist, centre_mm, up):
+def _screw(twist: FloatArray, centre_mm: FloatArray, up: Sequence[float] | FloatArray) -> str:
     """A twist (6,) at the platform's centre, lengths counted in the arm, in words."""
     shift, turn = twist[:3] * ARM_MM, twist[3:]
     square = turn @ turn

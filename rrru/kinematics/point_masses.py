@@ -8,11 +8,19 @@ The derivatives are central differences of the exactly closed legs. Lengths in m
 """
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rrru.kinematics.chain import Twists, value_of, walks
-from rrru.kinematics.legs import cross, turn_about
+from rrru.kinematics.arrays import FloatArray
+from rrru.kinematics.chain import Poses, Twists, Walk, value_of, walks
+from rrru.kinematics.legs import Leg, Legs, cross, turn_about
+
+if TYPE_CHECKING:
+    from rrru.kinematics.general_robot import GeneralRobot
+
+# values, rates and accelerations (n, K) of the drives
+DriveMotion = tuple[FloatArray, FloatArray, FloatArray]
 
 # steps of the differences: in time, and of a driven value in rad or mm
 _STEP_S, _STEP = 1e-3, {"R": 1e-4, "P": 1e-2}
@@ -30,10 +38,10 @@ class PointMass:
 
     joint: str
     mass_kg: float
-    at_mm: np.ndarray
+    at_mm: FloatArray
 
 
-def places(robot, actuators, poses, twists=None):
+def places(robot: "GeneralRobot", actuators: FloatArray, poses: Poses, twists: FloatArray | None = None) -> FloatArray:
     """Places (n, point masses, 3) in mm of a robot's point masses at actuator values (n, K) and Poses that fit them.
 
     twists: finite ones (1, sites, 6) at the sites.
@@ -46,14 +54,19 @@ def places(robot, actuators, poses, twists=None):
             result.append(poses.point(point_mass.at_mm))
             continue
         leg = holders[point_mass.joint]
-        if point_mass.joint in leg.bar_sites:
-            result.append(_along_bar(leg, ways[leg], point_mass))
+        way = ways[leg]
+        if way.bar and point_mass.joint in leg.bar_sites:
+            end = way.bar.near if point_mass.joint == leg.bar_sites[0] else way.bar.far
+            # counted along it from its first ball joint, or from its end
+            result.append(end + point_mass.at_mm[0] * way.bar.line)
         else:
-            result.append(_behind_joint(robot.legs, leg, ways[leg], point_mass, (poses, actuators)))
+            result.append(_behind_joint(robot.legs, leg, way, point_mass, (poses, actuators)))
     return np.stack(result, axis=1)
 
 
-def _behind_joint(legs, leg, way, point_mass, state):
+def _behind_joint(
+    legs: Legs, leg: Leg, way: Walk, point_mass: PointMass, state: tuple[Poses, FloatArray]
+) -> FloatArray:
     """Places (n, 3) of a point mass fixed in the frame behind the motion of a joint."""
     (poses, actuators), number = state, [joint.name for joint in leg.joints].index(point_mass.joint)
     joint, turn, place = leg.joints[number], way.turns[number], way.places[number]
@@ -63,16 +76,10 @@ def _behind_joint(legs, leg, way, point_mass, state):
             turn = turn @ turn_about(joint.axis, known)
         else:
             place = place + known[:, None] * way.axes[number]
-    return place + turn @ point_mass.at_mm
+    return np.asarray(place + turn @ point_mass.at_mm)
 
 
-def _along_bar(leg, way, point_mass):
-    """Places (n, 3) of a point mass on a bar, counted along it from its first ball joint, or from its end."""
-    end = way.bar.near if point_mass.joint == leg.bar_sites[0] else way.bar.far
-    return end + point_mass.at_mm[0] * way.bar.line
-
-
-def driven_loads(robot, motion, poses, gravity_mm_s2):
+def driven_loads(robot: "GeneralRobot", motion: DriveMotion, poses: Poses, gravity_mm_s2: FloatArray) -> FloatArray:
     """Loads (n, D) on the driven values, in N mm or N.
 
     motion: values, rates and accelerations (n, K) of the drives; poses: the Poses there. NaN where a pose is not known.
@@ -87,7 +94,7 @@ def driven_loads(robot, motion, poses, gravity_mm_s2):
     return result
 
 
-def member_forces(robot, motion, poses, gravity_mm_s2):
+def member_forces(robot: "GeneralRobot", motion: DriveMotion, poses: Poses, gravity_mm_s2: FloatArray) -> FloatArray:
     """Forces (n, members) in N that a robot's masses put on its members, compression positive.
 
     A member that grows by s does the work f s on them: f = -sum m (g - x'') . dx/ds. motion, poses as in
@@ -104,7 +111,9 @@ def member_forces(robot, motion, poses, gravity_mm_s2):
     return result
 
 
-def moments(robot, motion, poses, gravity_mm_s2, at_mm):
+def moments(
+    robot: "GeneralRobot", motion: DriveMotion, poses: Poses, gravity_mm_s2: FloatArray, at_mm: FloatArray
+) -> FloatArray:
     """Moments (n, J, 3) in N mm of an arm's masses about the places at_mm (n, J, 3) of the joints that carry them.
 
     The joints are `rrru.kinematics.legs.Legs.arm_joints`; motion, poses as in `driven_loads`.
@@ -120,16 +129,16 @@ def moments(robot, motion, poses, gravity_mm_s2, at_mm):
     return result
 
 
-def base_moment(robot, motion, poses, gravity_mm_s2):
+def base_moment(robot: "GeneralRobot", motion: DriveMotion, poses: Poses, gravity_mm_s2: FloatArray) -> FloatArray:
     """Moments (n, 3) in N mm of a robot's masses about its origin; motion, poses as in `driven_loads`."""
     robot, motion = _uncoupled(robot, motion)
     force, place = _forces(robot, motion, poses, gravity_mm_s2), places(robot, motion[0], poses)
-    return cross(place, force).sum(axis=1)
+    return np.asarray(cross(place, force).sum(axis=1))
 
 
-def _behind(legs):
+def _behind(legs: Legs) -> dict[str, set[str]]:
     """By joint's name the names of it and of all joints behind it, in every leg that has it."""
-    result = {}
+    result: dict[str, set[str]] = {}
     for leg in legs.legs:
         names = [joint.name for joint in leg.joints]
         for number, name in enumerate(names):
@@ -137,18 +146,19 @@ def _behind(legs):
     return result
 
 
-def _uncoupled(robot, motion):
+def _uncoupled(robot: "GeneralRobot", motion: DriveMotion) -> tuple["GeneralRobot", DriveMotion]:
     """The robot with all its driven values free, and a motion (values, rates, accelerations) of these."""
-    motion = tuple(robot.legs.driven(part) for part in motion)
-    return robot if robot.legs.coupling is None else replace(robot, legs=robot.legs.uncoupled), motion
+    values, rates, accelerations = (robot.legs.driven(part) for part in motion)
+    free = robot if robot.legs.coupling is None else replace(robot, legs=robot.legs.uncoupled)
+    return free, (values, rates, accelerations)
 
 
-def _moved(robot, actuators, poses, twists=None):
+def _moved(robot: "GeneralRobot", actuators: FloatArray, poses: Poses, twists: FloatArray | None = None) -> FloatArray:
     """Places (n, point masses, 3) at other driven values (n, D) or under twists (1, sites, 6), from Poses nearby."""
     return places(robot, actuators, robot.model.solve(actuators, poses, twists), twists)
 
 
-def _forces(robot, motion, poses, gravity_mm_s2):
+def _forces(robot: "GeneralRobot", motion: DriveMotion, poses: Poses, gravity_mm_s2: FloatArray) -> FloatArray:
     """Weight and inertia force (n, point masses, 3) in N of every point mass."""
     actuators, rate, acceleration = motion
     bend = 0.5 * _STEP_S**2 * acceleration

@@ -4,25 +4,26 @@ A robot's class adds its legs, parts and parameters, and closed forms of these m
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 import numpy.typing as npt
 
 from rrru.errors import UnreachableError
-from rrru.kinematics.base_parameters import MeasurementConfig
-from rrru.kinematics.chain import Poses
-from rrru.kinematics.closure import Closure
+from rrru.kinematics.arrays import BoolArray, FloatArray
+from rrru.kinematics.base_parameters import Candidate, MeasurementConfig
+from rrru.kinematics.chain import PoseGuess, Poses
+from rrru.kinematics.closure import Closure, ForwardModel
+from rrru.kinematics.dynamics import Masses
 from rrru.kinematics.legs import Legs, Parts
 from rrru.kinematics.measurement_jacobian import ReadingMap
 from rrru.kinematics.parameter_jacobian import TwistMap
+from rrru.kinematics.point_masses import DriveMotion, PointMass
 from rrru.kinematics.readings import Readings, place_on_platform, points_read, turned_by
 from rrru.parameters import ParameterSet
-
-FloatArray = npt.NDArray[np.float64]
 
 
 class Robot(ABC):
@@ -40,37 +41,66 @@ class Robot(ABC):
     """
 
     name: str
-    parameters: ParameterSet
-    legs: Legs
     parts: Parts
-    directions: np.ndarray
-    angle_arm_mm: float
-    size_mm: float
-    farthest_mm: float
-    reach_mm: float
     drive_range: FloatArray | None
     TRACKED: str
     RICHEST: str
     SEARCHED: str
-    up = (0.0, 0.0, 1.0)
-    tool_mm = (0.0, 0.0, 0.0)
+    up: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    tool_mm: tuple[float, float, float] = (0.0, 0.0, 0.0)
     # largest loads in N mm or N, and rates in rad/s or mm/s, of the drives (K,) by its file, NaN for a drive without
     # one; None where it states none
     effort_limits: FloatArray | None = None
     velocity_limits: FloatArray | None = None
-    # `rrru.kinematics.point_masses.PointMass` of its links
-    point_masses: tuple = ()
+    # of its links
+    point_masses: tuple[PointMass, ...] = ()
     # what a campaign measures in addition to the tool's position, and what is unknown about it
     reads: MeasurementConfig = MeasurementConfig()
-    # whether its drives can orient its platform besides moving it
-    orients = False
     # whether positions and their slopes are found without poses
     closed_form = False
-    # grid lines over its longest reach in a picture of its workspace
-    workspace_lines = 130
+
+    if TYPE_CHECKING:
+        # fields of some robots, computed by others: for the type checker read-only, or no class could compute them
+
+        @property
+        def parameters(self) -> ParameterSet:
+            """The meaning of every vector of deviations (p,)."""
+
+        @property
+        def legs(self) -> Legs:
+            """Its legs, joints and sites."""
+
+        @property
+        def directions(self) -> FloatArray:
+            """Twists (sites, 6, p) that a unit of each parameter makes."""
+
+        @property
+        def angle_arm_mm(self) -> float:
+            """Characteristic length that makes angles comparable with lengths."""
+
+        @property
+        def size_mm(self) -> float:
+            """Upper bound of the tool's distance from the origin."""
+
+        @property
+        def farthest_mm(self) -> float:
+            """That of the farthest reachable point, or size_mm."""
+
+        @property
+        def reach_mm(self) -> float:
+            """Upper bound of the tool's distance from a leg's foot."""
+
+    else:
+        parameters: ParameterSet
+        legs: Legs
+        directions: FloatArray
+        angle_arm_mm: float
+        size_mm: float
+        farthest_mm: float
+        reach_mm: float
 
     @abstractmethod
-    def inverse(self, position_mm: np.ndarray, deviations: np.ndarray | None = None, elbow: str = "out") -> np.ndarray:
+    def inverse(self, position_mm: FloatArray, deviations: FloatArray | None = None, elbow: str = "out") -> FloatArray:
         """Actuator values (n, K) for positions (n, 3) in an assembly ("out", "in"); NaN where out of reach."""
 
     @abstractmethod
@@ -78,58 +108,69 @@ class Robot(ABC):
         """Mapping of the parameters from values of any of its deviations by name."""
 
     @property
-    def strokes(self):
+    def orients(self) -> bool:
+        """Whether its drives can orient its platform besides moving it; not those of most robots."""
+        return False
+
+    @property
+    def workspace_lines(self) -> int:
+        """Grid lines over its longest reach in a picture of its workspace."""
+        return 130
+
+    @property
+    def strokes(self) -> FloatArray:
         """Widths (K,) of the drives' stated ranges, NaN where none is stated, as for most robots."""
         return np.full(len(self.parts.drives), np.nan)
 
-    def in_range(self, actuators):
+    def in_range(self, actuators: FloatArray) -> FloatArray:
         """Actuator values (n, K), NaN outside of the drives' stated ranges; for most robots none are stated."""
         return actuators
 
-    def planned(self, position_mm, deviations=None):
+    def planned(self, position_mm: FloatArray, deviations: FloatArray | None = None) -> FloatArray:
         """Actuator values (n, K) as `inverse` gives them, within the drives' ranges; NaN also outside of these."""
         return self.in_range(self.inverse(position_mm, deviations))
 
     @property
-    def z_down(self):
+    def z_down(self) -> bool:
         """Whether z of its frame points to the ground."""
         return bool(self.up[2] < 0.0)
 
     @cached_property
-    def model(self):
+    def model(self) -> ForwardModel:
         """The legs, closed."""
         return Closure(self.legs)
 
-    def reading(self, reads):
+    def reading(self, reads: MeasurementConfig) -> "Robot":
         """The robot for a campaign with unknowns besides its own parameters, see `MeasurementConfig`."""
         from rrru.kinematics.augmented_robot import AugmentedRobot
 
         return AugmentedRobot(self, reads) if reads.reflectors or reads.turned or reads.frame else self
 
-    def seen_at(self, _actuators, _position_mm, _readings=None):
+    def seen_at(self, _actuators: FloatArray, _position_mm: FloatArray, _readings: Readings | None = None) -> "Robot":
         """The robot with its parameters reduced to the identifiable ones at poses; most robots have a fixed set."""
         return self
 
-    def widened(self, angle_rad, length_mm):
+    def widened(self, angle_rad: float, length_mm: float) -> Self:
         """The robot with other bounds of its parameters."""
-        return replace(self, angle_limit_rad=angle_rad, length_limit_mm=length_mm)
+        # every robot is a dataclass that has these fields, this class is none
+        return replace(self, angle_limit_rad=angle_rad, length_limit_mm=length_mm)  # type: ignore[type-var]
 
     @property
-    def seats(self):
+    def seats(self) -> tuple[str, ...]:
         """Sites of the axes that a manufacturer may have set wrongly: those of all joints that move."""
         return tuple(joint.name for joint in self.legs.joints if joint.kind != "fixed")
 
     @property
-    def stages(self):
+    def stages(self) -> tuple[BoolArray, ...]:
         """Which parameters (p,) a search finds first where the nominal robot is far off, in turn."""
         return ()
 
     @property
-    def gauge(self):
+    def gauge(self) -> dict[str, str]:
         """By name of a not identifiable parameter the combination that replaces it, in words; empty for a fixed set."""
         return {}
 
-    def confounded_outside(self, name):
+    def confounded_outside(self, name: str) -> tuple[tuple[Candidate, float], ...]:
         """Candidates outside the robot that a parameter is confounded with, and its size for a unit of each.
 
         Empty for a fixed set.
@@ -137,16 +178,16 @@ class Robot(ABC):
         return ()
 
     @property
-    def offered(self):
+    def offered(self) -> BoolArray:
         """Which components (sites, 6) of constant twists its parameters are chosen from; none for a fixed set."""
         return np.zeros((len(self.legs.sites), 6), dtype=bool)
 
     @property
-    def deviation_names(self):
+    def deviation_names(self) -> tuple[str, ...]:
         """Names of the deviations that `twists_of` knows."""
         return self.parameters.names
 
-    def twists_of(self, values):
+    def twists_of(self, values: Mapping[str, float]) -> FloatArray:
         """Twists (1, sites, 6) of deviations by name."""
         return self.twists(self.parameters.vector(values))
 
@@ -154,16 +195,16 @@ class Robot(ABC):
         """Twists (1, sites, 6) that deviations (p,) make."""
         if deviations is None:
             return np.zeros((1, len(self.legs.sites), 6))
-        return (self.directions @ np.asarray(deviations, dtype=float))[None]
+        return np.asarray((self.directions @ np.asarray(deviations, dtype=float))[None])
 
-    def near(self, position_mm, actuators):
+    def near(self, position_mm: FloatArray, actuators: FloatArray) -> PoseGuess:
         """Poses near which the legs close at positions (n, 3) and actuator values (n, K): an upright platform's."""
         n = len(position_mm)
         turn = np.broadcast_to(self.legs.home_turn, (n, 3, 3))
         centre = np.asarray(position_mm, dtype=float) - self.legs.home_turn @ np.asarray(self.tool_mm)
-        return Poses(centre, turn, self.passive_near(centre, np.asarray(actuators, dtype=float)), None, None)
+        return PoseGuess(centre, turn, self.passive_near(centre, np.asarray(actuators, dtype=float)))
 
-    def passive_near(self, position_mm, actuators):
+    def passive_near(self, position_mm: FloatArray, actuators: FloatArray) -> FloatArray:
         """Values (n, k) of the passive joints near platform centres (n, 3) and actuator values (n, K)."""
         return np.broadcast_to(self.legs.home_passive, (len(position_mm), len(self.legs.passive_joints)))
 
@@ -180,7 +221,7 @@ class Robot(ABC):
 
     def map(
         self, actuators: FloatArray, poses: Poses, twists: FloatArray | None = None, readings: Readings | None = None
-    ) -> Any:
+    ) -> TwistMap:
         """The TwistMap at actuator values (n, K) and Poses that fit them under twists (n or 1, sites, 6).
 
         Of the tool, or of Readings at these poses.
@@ -191,12 +232,12 @@ class Robot(ABC):
             return TwistMap(self.model, actuators, poses, twists, place)
         return ReadingMap(self, actuators, poses, given, place, readings)
 
-    def map_at(self, actuators, position_mm, deviations=None):
+    def map_at(self, actuators: FloatArray, position_mm: FloatArray, deviations: FloatArray | None = None) -> TwistMap:
         """The TwistMap under deviations (p,) at actuator values (n, K), near positions (n, 3)."""
         twists = self.twists(deviations)
         return self.map(actuators, self.solve(actuators, position_mm, twists), twists)
 
-    def guess(self, actuators, targets=None):
+    def guess(self, actuators: FloatArray, targets: Sequence[str] | None = None) -> FloatArray:
         """Positions (n, 3) from which to search poses at actuator values (n, K): the home position.
 
         targets (n,): names of the targets read; with several end effectors they determine the one that carries it.
@@ -214,7 +255,9 @@ class Robot(ABC):
         guess = self.guess(actuators) if guess_mm is None else guess_mm
         return self.measured(self.solve(actuators, guess, twists), twists)
 
-    def forward_batch(self, actuators, deviations, guess_mm=None):
+    def forward_batch(
+        self, actuators: FloatArray, deviations: FloatArray, guess_mm: FloatArray | None = None
+    ) -> FloatArray:
         """Positions (m, n, 3) at n actuator values under m vectors of deviations (m, p); see `forward`."""
         deviations, count = np.asarray(deviations, dtype=float), len(actuators)
         twists = np.repeat(np.einsum("scp,mp->msc", self.directions, deviations), count, axis=0)
@@ -227,13 +270,15 @@ class Robot(ABC):
     ) -> Callable[[FloatArray], FloatArray]:
         """Objective: deviations (m, p) to mean distances (m,) in mm from measured positions (n, 3)."""
 
-        def evaluate(deviations):
+        def evaluate(deviations: FloatArray) -> FloatArray:
             off = np.linalg.norm(self.forward_batch(actuators, deviations, nominal_mm) - measured_mm, axis=2)
             return np.where(np.isfinite(off).all(axis=1), off.mean(axis=1), np.inf)
 
         return evaluate
 
-    def actuator_jacobian(self, position_mm, actuators, deviations=None):
+    def actuator_jacobian(
+        self, position_mm: FloatArray, actuators: FloatArray, deviations: FloatArray | None = None
+    ) -> FloatArray:
         """Derivative (n, 3, K) of the position by the actuator values."""
         return self.map_at(actuators, position_mm, deviations).drive_response
 
@@ -243,7 +288,9 @@ class Robot(ABC):
         """Derivative (n, 3, p) of the position by the parameters."""
         return self.map_at(actuators, position_mm, deviations).columns(self.directions)
 
-    def singularities(self, position_mm, actuators):
+    def singularities(
+        self, position_mm: FloatArray, actuators: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Distance of poses from singularities: translational measure, constraint measure and determinant, each (n,).
 
         The constraint measure is the smallest singular value of the legs' unit wrenches, lengths counted in the robot's
@@ -254,26 +301,30 @@ class Robot(ABC):
         lengths = np.array([1.0 if unit == "mm" else self.angle_arm_mm for unit in self.parts.units])
         return at.translational_measure(lengths), *at.constraint_measures(self.angle_arm_mm)
 
-    def own_load(self, masses, motion, poses, gravity_mm_s2):
+    def own_load(
+        self, masses: Masses, motion: DriveMotion, poses: Poses, gravity_mm_s2: FloatArray
+    ) -> FloatArray | float:
         """Loads (n, D) on the driven values, in N mm or N, of all moving masses except the platform's; none here.
 
         motion: values, rates and accelerations (n, K) of the drives; gravity_mm_s2 (3,): in the robot's frame.
         """
         return 0.0
 
-    def own_member_forces(self, motion, poses, gravity_mm_s2):
+    def own_member_forces(self, motion: DriveMotion, poses: Poses, gravity_mm_s2: FloatArray) -> FloatArray | float:
         """Forces (n, members) in N on the members, compression positive, without the platform's load; none here."""
         return 0.0
 
-    def own_moments(self, motion, poses, gravity_mm_s2, at_mm):
+    def own_moments(
+        self, motion: DriveMotion, poses: Poses, gravity_mm_s2: FloatArray, at_mm: FloatArray
+    ) -> FloatArray | float:
         """Moments (n, J, 3) in N mm of an arm's masses, without the platform's, about places at_mm; none here."""
         return 0.0
 
-    def own_base_moment(self, motion, poses, gravity_mm_s2):
+    def own_base_moment(self, motion: DriveMotion, poses: Poses, gravity_mm_s2: FloatArray) -> FloatArray | float:
         """Moments (n, 3) in N mm about the origin of all moving masses except the platform's; none here."""
         return 0.0
 
-    def drive_errors(self, twists):
+    def drive_errors(self, twists: FloatArray) -> FloatArray:
         """Changes (n, K) of the actuator values in twists (n, sites, 6), by least squares."""
         numbers = self.legs.site_numbers
         units = np.zeros((len(self.parts.drives), len(numbers), 6))
@@ -281,13 +332,13 @@ class Robot(ABC):
             for site, twist in drive.twists.items():
                 unit[numbers[site]] = twist
         flat = units.reshape(len(units), -1)
-        return np.linalg.solve(flat @ flat.T, flat @ twists.reshape(len(twists), -1).T).T
+        return np.asarray(np.linalg.solve(flat @ flat.T, flat @ twists.reshape(len(twists), -1).T).T, dtype=float)
 
-    def unreached(self, values, as_home=True):
+    def unreached(self, values: FloatArray, as_home: bool = True) -> str:
         """Why a point whose actuator values (K,) are NaN in part cannot be reached, for a message."""
         return "out of reach of leg " + ", ".join(str(leg + 1) for leg in np.flatnonzero(np.isnan(values)))
 
-    def require_reachable(self, position_mm, deviations=None):
+    def require_reachable(self, position_mm: FloatArray, deviations: FloatArray | None = None) -> FloatArray:
         """Actuator values as `planned` gives them; raises UnreachableError naming the first point out of reach."""
         values = self.planned(position_mm, deviations)
         bad = np.flatnonzero(np.isnan(values).any(axis=1))
@@ -300,7 +351,7 @@ class Robot(ABC):
         return values
 
 
-def into_frame(position_mm, frame):
+def into_frame(position_mm: FloatArray, frame: FloatArray) -> FloatArray:
     """Positions (n, 3) carried by frames (n or 1, 6): shift in mm and rotation vector in rad."""
     if not np.any(frame):
         return position_mm

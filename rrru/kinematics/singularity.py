@@ -6,31 +6,57 @@ each is the smallest singular value of a matrix of three unit rows, 0 at a singu
 equations of a platform that only translates do not show the second kind.
 """
 
+from typing import Protocol
+
 import numpy as np
 
+from rrru.kinematics.arrays import FloatArray
 
-def leg_forces(mechanism, position_mm, actuators, deviations=None):
+
+class ThreeLegged(Protocol):
+    """A mechanism whose three legs have one closure each."""
+
+    def closure_jacobians(
+        self, position_mm: FloatArray, actuators: FloatArray, deviations: FloatArray | None = None, /
+    ) -> tuple[FloatArray, FloatArray]:
+        """Derivatives of the closures by the position (n, 3, 3) and by the legs' numbers (n, 3, k)."""
+
+    def constraint_moments(
+        self, position_mm: FloatArray, actuators: FloatArray, deviations: FloatArray | None = None, /
+    ) -> FloatArray:
+        """Unit directions (n, 3 legs, 3) about which each leg keeps the platform from turning."""
+
+
+def leg_forces(
+    mechanism: ThreeLegged, position_mm: FloatArray, actuators: FloatArray, deviations: FloatArray | None = None
+) -> FloatArray:
     """Unit directions (n, 3 legs, 3) in which each leg pushes the platform: rows of the normalised closure Jacobian."""
     gradient, _ = mechanism.closure_jacobians(position_mm, actuators, deviations)
-    return gradient / np.linalg.norm(gradient, axis=-1, keepdims=True)
+    return np.asarray(gradient / np.linalg.norm(gradient, axis=-1, keepdims=True))
 
 
-def translational_measure(mechanism, position_mm, actuators, deviations=None):
+def translational_measure(
+    mechanism: ThreeLegged, position_mm: FloatArray, actuators: FloatArray, deviations: FloatArray | None = None
+) -> FloatArray:
     """Smallest singular value (n,) of the legs' forces; 0 where the platform can move with all drives locked."""
     return _smallest_singular_value(leg_forces(mechanism, position_mm, actuators, deviations))
 
 
-def constraint_measure(mechanism, position_mm, actuators, deviations=None):
+def constraint_measure(
+    mechanism: ThreeLegged, position_mm: FloatArray, actuators: FloatArray, deviations: FloatArray | None = None
+) -> FloatArray:
     """Smallest singular value (n,) of the constraint moments; 0 where the platform can turn with all drives locked."""
     return _smallest_singular_value(mechanism.constraint_moments(position_mm, actuators, deviations))
 
 
-def constraint_determinant(mechanism, position_mm, actuators, deviations=None):
+def constraint_determinant(
+    mechanism: ThreeLegged, position_mm: FloatArray, actuators: FloatArray, deviations: FloatArray | None = None
+) -> FloatArray:
     """Determinant (n,) of the constraint moments; its sign changes across a constraint singularity."""
-    return np.linalg.det(mechanism.constraint_moments(position_mm, actuators, deviations))
+    return np.asarray(np.linalg.det(mechanism.constraint_moments(position_mm, actuators, deviations)))
 
 
-def _smallest_singular_value(matrices):
+def _smallest_singular_value(matrices: FloatArray) -> FloatArray:
     """Smallest singular value (n,) of (n, 3, 3) matrices, NaN where the pose cannot be reached."""
     result = np.full(len(matrices), np.nan)
     fine = np.isfinite(matrices).all(axis=(1, 2))

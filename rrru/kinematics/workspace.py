@@ -1,11 +1,20 @@
 """Slices of the reachable workspace with both singularity measures. Lengths in mm."""
 
+from typing import TYPE_CHECKING
+
 import numpy as np
+
+from rrru.kinematics.arrays import BoolArray, FloatArray
+
+if TYPE_CHECKING:
+    from rrru.kinematics.robot import Robot
 
 PLANES = {"xz": (0, 2, 1), "xy": (0, 1, 2)}
 
 
-def slice_points(plane, at_mm, horizontal_mm, vertical_mm, step_mm):
+def slice_points(
+    plane: str, at_mm: float, horizontal_mm: tuple[float, float], vertical_mm: tuple[float, float], step_mm: float
+) -> FloatArray:
     """Regular grid (n, 3) in a plane, "xz" at a y or "xy" at a z; ranges (low, high) of its first and second axis."""
     first, second, fixed = PLANES[plane]
     grid_a, grid_b = np.meshgrid(
@@ -18,7 +27,9 @@ def slice_points(plane, at_mm, horizontal_mm, vertical_mm, step_mm):
     return points
 
 
-def measures(mechanism, points_mm, theta):
+def measures(
+    mechanism: "Robot", points_mm: FloatArray, theta: FloatArray
+) -> tuple[BoolArray, FloatArray, FloatArray, FloatArray]:
     """Reachable (n,), translational and constraint measure (n,), constraint determinant (n,); NaN out of reach.
 
     theta (n, K): the actuator values of the points, as `planned` gives them.
@@ -31,7 +42,7 @@ def measures(mechanism, points_mm, theta):
     return reachable, *result
 
 
-def farthest_mm(robot):
+def farthest_mm(robot: "Robot") -> float:
     """Distance of the farthest reachable point from the origin in mm, found on rays in all directions."""
     count = 400
     height, turn = np.linspace(-1.0, 1.0, count), np.pi * (3.0 - np.sqrt(5.0)) * np.arange(count)

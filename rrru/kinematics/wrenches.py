@@ -5,24 +5,29 @@ shared joint in all of them, and so are the wrenches W with W S = 0; where each 
 is the same for all. Screws and twists are at the world's origin, the velocity first. Lengths in mm, angles in rad.
 """
 
+from collections.abc import Sequence, Set
+
 import numpy as np
 
-from rrru.kinematics.chain import Twists, walk
+from rrru.kinematics.arrays import FloatArray
+from rrru.kinematics.chain import Twists, Walk, walk
 from rrru.kinematics.closure_kernel import ARM_MM
-from rrru.kinematics.legs import cross
+from rrru.kinematics.legs import Joint, Legs, cross
 
 # smallest singular value of a leg's passive screws, lengths counted in the arm, that counts as a motion
 _RANK = 1e-7
 SCALE = np.array([ARM_MM, ARM_MM, ARM_MM, 1.0, 1.0, 1.0])
 
 
-def screw(joint, axis, place):
+def screw(joint: Joint, axis: FloatArray, place: FloatArray) -> FloatArray:
     """Screw (n, 6) of a joint with axes (n, 3) through places (n, 3)."""
     turning = joint.kind == "R"
     return np.concatenate([cross(place, axis), axis] if turning else [axis, np.zeros_like(axis)], axis=1)
 
 
-def group_screws(legs, group, ways, spare=frozenset()):
+def group_screws(
+    legs: Legs, group: Sequence[int], ways: Sequence[Walk], spare: Set[str] = frozenset()
+) -> tuple[list[str], FloatArray]:
     """Names (k,) of the passive joints of a group of m legs, without spare ones, and their screws (n, 6 m, k)."""
     passive = [[j for j in legs.legs[number].joints if j.passive and j.name not in spare] for number in group]
     names = list(dict.fromkeys(joint.name for joints in passive for joint in joints))
@@ -35,7 +40,7 @@ def group_screws(legs, group, ways, spare=frozenset()):
     return names, result
 
 
-def spare_joints(legs):
+def spare_joints(legs: Legs) -> set[str]:
     """Names of the passive joints that depend on those before them a little off home, where joints may be in line.
 
     They keep their values: a link between two ball joints does not spin.
@@ -50,13 +55,13 @@ def spare_joints(legs):
     return result
 
 
-def rank_of(screws):
+def rank_of(screws: FloatArray) -> int:
     """Number of independent screws (6 m, k)."""
     scale = np.resize(SCALE, len(screws))
     return int(np.linalg.matrix_rank(screws / scale[:, None], tol=_RANK)) if screws.shape[1] else 0
 
 
-def constraints_of(legs, spare):
+def constraints_of(legs: Legs, spare: Set[str]) -> list[int]:
     """Number of the wrenches of every group, `spare` the names of the joints that keep their values."""
     result = []
     for group in legs.groups:
@@ -65,34 +70,32 @@ def constraints_of(legs, spare):
     return result
 
 
-def wrenches_of(legs, spare, ways):
+def wrenches_of(legs: Legs, spare: Set[str], ways: Sequence[Walk]) -> list[FloatArray]:
     """Wrenches (n, r, 6) of every leg, which together with those of its group are reciprocal to the passive joints.
 
     spare: names of joints that keep their values.
     """
-    result = [None] * len(legs.legs)
+    result: dict[int, FloatArray] = {}
     for group in legs.groups:
-        leg, way = legs.legs[group[0]], ways[group[0]]
-        if leg.bar:
+        if bar := ways[group[0]].bar:
             # a unit force along it
-            line = way.bar.line
-            result[group[0]] = np.concatenate([line, cross(way.bar.near, line)], axis=1)[:, None]
+            result[group[0]] = np.concatenate([bar.line, cross(bar.near, bar.line)], axis=1)[:, None]
             continue
         stacked = _reciprocal(group_screws(legs, group, ways, spare)[1])
         for row, number in enumerate(group):
             result[number] = stacked[:, :, 6 * row : 6 * row + 6]
-    return result
+    return [result[number] for number in range(len(legs.legs))]
 
 
-def _reciprocal(screws):
+def _reciprocal(screws: FloatArray) -> FloatArray:
     """Wrenches (n, 6 m - k, 6 m) reciprocal to independent screws (n, 6 m, k)."""
     scale = np.resize(SCALE, screws.shape[1])
     if not screws.shape[2]:
         return np.broadcast_to(np.eye(len(scale)), (len(screws), len(scale), len(scale)))
     u, _, _ = np.linalg.svd(screws / scale[:, None])
-    return u[:, :, screws.shape[2] :].transpose(0, 2, 1) / scale
+    return np.asarray(u[:, :, screws.shape[2] :].transpose(0, 2, 1) / scale)
 
 
-def by_group(legs, wrenches):
+def by_group(legs: Legs, wrenches: Sequence[FloatArray]) -> list[FloatArray]:
     """Wrenches (n, r, 6) on the platform by groups of legs, from those of the legs."""
     return [sum((wrenches[k] for k in group[1:]), wrenches[group[0]]) for group in legs.groups]

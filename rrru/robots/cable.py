@@ -5,15 +5,27 @@ of freedom are met by least squares. In a plane a leg of two slides and a turn, 
 Lengths in mm, angles in rad.
 """
 
+from typing import Any
+
 import numpy as np
+import numpy.typing as npt
 
 from rrru.errors import ConfigError
+from rrru.kinematics.arrays import FloatArray
 from rrru.kinematics.general_robot import GeneralRobot
 from rrru.kinematics.legs import Joint, Leg, Legs, X, Y, Z
 from rrru.robots.hexapod import bar_parts, driven_bars
 
 
-def cable(anchors_mm, platform_mm, home_mm, stroke_mm=300.0, planar=False, name="cable", **options):
+def cable(
+    anchors_mm: npt.ArrayLike,
+    platform_mm: npt.ArrayLike,
+    home_mm: npt.ArrayLike,
+    stroke_mm: float = 300.0,
+    planar: bool = False,
+    name: str = "cable",
+    **options: Any,
+) -> GeneralRobot:
     """The GeneralRobot of cables from anchors_mm (k, 3) to platform_mm (k, 3), points of the platform.
 
     home_mm (3,): the platform in its home pose, from which a cable's length changes by up to stroke_mm; planar: the
@@ -35,7 +47,7 @@ def cable(anchors_mm, platform_mm, home_mm, stroke_mm=300.0, planar=False, name=
     )
 
 
-def _plane(home_mm):
+def _plane(home_mm: FloatArray) -> Leg:
     """The leg that keeps a platform in its plane."""
     return Leg(
         "plane",

@@ -16,7 +16,7 @@ from rrru.robots.from_dh import from_dh
 from rrru.robots.ptt3 import Ptt3
 from rrru.robots.rrru3 import Rrru3
 
-MECHANISMS: dict[str, Any] = {"rrru3": Rrru3, "ptt3": Ptt3, "delta": Delta}
+MECHANISMS: dict[str, type[Rrru3] | type[Ptt3] | type[Delta]] = {"rrru3": Rrru3, "ptt3": Ptt3, "delta": Delta}
 # keys of which one is in an entry that describes a robot of the user's own
 OWN = ("urdf", "mjcf", "dh", "module")
 
@@ -59,15 +59,16 @@ def _own(name: str, section: dict[str, Any], options: Mapping[str, Any]) -> Robo
     """A robot of the user's own from a URDF or MJCF file, DH rows or a Python module."""
     tool: dict[str, Any] = {"tool_mm": tuple(section.pop("tool_mm"))} if "tool_mm" in section else {}
     if "module" in section:
-        robot = load_object(f"robot {name}", section["module"])()
-        if not isinstance(robot, GeneralRobot):
-            raise ConfigError(f"robot {name}: {section['module']} gave a {type(robot).__name__}; allowed: GeneralRobot")
-        if free := free_motions(robot.legs, robot.up):
+        own = load_object(f"robot {name}", section["module"])()
+        if not isinstance(own, GeneralRobot):
+            raise ConfigError(f"robot {name}: {section['module']} gave a {type(own).__name__}; allowed: GeneralRobot")
+        if free := free_motions(own.legs, own.up):
             raise ConfigError(f"robot {name}: its platform is free to {'; '.join(free)}; allowed: legs that hold it")
-        return replace(robot, name=name, **tool, **options)
+        return replace(own, name=name, **tool, **options)
     if "dh" in section:
         return from_dh(section.pop("dh"), **section, name=name, **tool, **options)
     from rrru.formats import robot_file
 
     read, key = (robot_file.from_urdf, "urdf") if "urdf" in section else (robot_file.from_mjcf, "mjcf")
-    return read(section.pop(key), **section, name=name, **tool, **options)
+    robot: Robot = read(section.pop(key), **section, name=name, **tool, **options)
+    return robot

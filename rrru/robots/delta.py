@@ -17,6 +17,7 @@ Of the scan's equations (1), (3) to (6) the text around them is left; they are r
 rad.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import ClassVar
@@ -24,8 +25,11 @@ from typing import ClassVar
 import numpy as np
 
 from rrru.errors import ConfigError
-from rrru.kinematics.dynamics import arm_load
-from rrru.kinematics.legs import Joint, Legs, Parts, X, Y, Z, turn_about
+from rrru.kinematics.arrays import FloatArray
+from rrru.kinematics.chain import Poses
+from rrru.kinematics.dynamics import Masses, arm_load
+from rrru.kinematics.legs import Joint, Leg, Legs, Parts, X, Y, Z, turn_about
+from rrru.kinematics.point_masses import DriveMotion
 from rrru.parameters import LEGS
 from rrru.robots.three_legs import Deviation, of_each, of_each_leg, of_three_legs, points, three_drives
 from rrru.robots.tripod import BARS, Tripod, pair_of_bars
@@ -56,7 +60,7 @@ class Delta(Tripod):
     RICHEST = "legs"
     DIMENSIONS = ("l1_mm", "l2_mm", "a_mm", "platform_mm", "spacing_mm")
     DEVIATIONS = _OWN[0] | _OWN[1] | _OWN[2] | _OWN[3] | _COMMON
-    PARAMETER_NAMES: ClassVar = {
+    PARAMETER_NAMES: ClassVar[Mapping[str, tuple[str, ...]]] = {
         "zero": (*_OWN[0],),
         "tied": (*_OWN[0], *_COMMON),
         "legs": (*_OWN[0], *_OWN[1], *_OWN[2], *_OWN[3]),
@@ -73,7 +77,7 @@ class Delta(Tripod):
         members=BARS,
     )
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         super().__post_init__()
         if not self.l2_mm > self.a_mm + self.l1_mm:
             raise ConfigError(
@@ -81,19 +85,19 @@ class Delta(Tripod):
             )
 
     @property
-    def angle_arm_mm(self):
+    def angle_arm_mm(self) -> float:
         """Length that makes deviations of angles comparable with those of lengths."""
         return self.l1_mm
 
     @property
-    def reach_mm(self):
+    def reach_mm(self) -> float:
         """Length of a stretched leg."""
         return self.l1_mm + self.l2_mm
 
     @cached_property
-    def legs(self):
+    def legs(self) -> Legs:
         """Six bars, two on the elbow of every arm, side by side."""
-        bars = []
+        bars: list[Leg] = []
         for leg, azimuth in zip(LEGS, self.azimuth_rad, strict=True):
             root = turn_about(Z, azimuth)
             arm = (
@@ -106,16 +110,16 @@ class Delta(Tripod):
         return Legs(tuple(bars), np.zeros(3))
 
     @property
-    def origin_depth_mm(self):
+    def origin_depth_mm(self) -> float:
         """Depth of the calibration frame's origin below the drive axes: the platform's at zero drive angles."""
         return float(np.sqrt(self.l2_mm**2 - (self.a_mm + self.l1_mm) ** 2))
 
     @cached_property
-    def nominal_legs(self):
+    def nominal_legs(self) -> FloatArray:
         """Numbers of the legs (3, 4) without deviations."""
         return np.tile([0.0, self.l1_mm, self.l2_mm, self.a_mm], (3, 1))
 
-    def inverse_of_legs(self, position_mm, legs, sign=1.0):
+    def inverse_of_legs(self, position_mm: FloatArray, legs: FloatArray, sign: float = 1.0) -> FloatArray:
         """Drive angles (n, 3) in rad under leg numbers (3, 4), knees outwards for sign 1; NaN where out of reach."""
         position = points(position_mm)
         u, v = self.radial_tangential(position)
@@ -125,24 +129,24 @@ class Delta(Tripod):
         with np.errstate(invalid="ignore", divide="ignore"):
             cosine = (legs[:, 1] ** 2 + d**2 + v**2 - legs[:, 2] ** 2) / (2.0 * legs[:, 1] * d)
             # beyond the reach arccos gives NaN, which is the mask the callers rely on
-            return np.arctan2(depth, inward) - sign * np.arccos(cosine) - legs[:, 0]
+            return np.asarray(np.arctan2(depth, inward) - sign * np.arccos(cosine) - legs[:, 0])
 
-    def ends(self, theta_rad, legs):
+    def ends(self, theta_rad: FloatArray, legs: FloatArray) -> FloatArray:
         """Arms' ends less the platform's radius, (..., n, 3 legs, 3) in mm, calibration frame, for angles (n, 3)."""
         angle = theta_rad + legs[..., 0]
         reach = legs[..., 3] + legs[..., 1] * np.cos(angle)
         height = self.origin_depth_mm - legs[..., 1] * np.sin(angle)
-        return reach[..., None] * self.radial + height[..., None] * np.array([0.0, 0.0, 1.0])
+        return np.asarray(reach[..., None] * self.radial + height[..., None] * Z)
 
-    def end_rates(self, theta_rad, legs):
+    def end_rates(self, theta_rad: FloatArray, legs: FloatArray) -> FloatArray:
         """Derivative (n, 3 legs, 3 axes, 4) of `ends` by the legs' numbers (3, 4)."""
         angle = theta_rad + legs[:, 0]
-        cosine, sine, up = np.cos(angle)[..., None], np.sin(angle)[..., None], np.array([0.0, 0.0, 1.0])
-        turned = -legs[:, 1, None] * (sine * self.radial + cosine * up)
-        columns = [turned, cosine * self.radial - sine * up, np.zeros(3), self.radial]
+        cosine, sine = np.cos(angle)[..., None], np.sin(angle)[..., None]
+        turned = -legs[:, 1, None] * (sine * self.radial + cosine * Z)
+        columns = [turned, cosine * self.radial - sine * Z, np.zeros(3), self.radial]
         return np.stack([np.broadcast_to(column, turned.shape) for column in columns], axis=-1)
 
-    def own_load(self, masses, motion, _poses, gravity_mm_s2):
+    def own_load(self, masses: Masses, motion: DriveMotion, _poses: Poses, gravity_mm_s2: FloatArray) -> FloatArray:
         """Torques (n, 3) in N mm of the arms' own masses about their drives; see `rrru.kinematics.dynamics`."""
         pulls = -np.cos(motion[0]) * gravity_mm_s2[2] - np.sin(motion[0]) * (self.radial @ gravity_mm_s2)
         return arm_load(masses, self.l1_mm, pulls, motion[2])

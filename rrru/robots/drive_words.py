@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+from rrru.kinematics.robot import Robot
+
 # a drive turns a joint, moves a slide, or changes the length of a leg between two ball joints (strut or cable)
 TURNING, SLIDING, LENGTH = KINDS = ("turning", "sliding", "length")
 # what a turning drive moves, by whether every drive has a leg of its own
@@ -51,7 +53,7 @@ class DriveWords:
         return tuple(dict.fromkeys(chosen or self.kinds or (TURNING,)))
 
 
-def drive_words(robot) -> DriveWords:
+def drive_words(robot: Robot) -> DriveWords:
     """The DriveWords of a Robot.
 
     >>> from rrru.robots.rrru3 import Rrru3

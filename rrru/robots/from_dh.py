@@ -1,9 +1,13 @@
 """Serial arms from the rows of a configuration, in mm and degrees; see `rrru.robots.serial`."""
 
+from collections.abc import Mapping, Sequence
+from typing import Any
+
 import numpy as np
 
 from rrru.errors import ConfigError
 from rrru.kinematics.end_effectors import with_hands
+from rrru.kinematics.general_robot import GeneralRobot
 from rrru.robots.serial import FRAME, JOINT, serial
 
 _LENGTHS, _ANGLES = ("a_mm", "d_mm"), ("alpha_deg", "theta_deg", "rpy_deg")
@@ -14,7 +18,14 @@ _JOINT = ("a_mm", "d_mm", "alpha_deg", "theta_deg", "sliding", *_VALUES, "name",
 _FRAME = ("xyz_mm", "rpy_deg", "mass_kg", "com_mm")
 
 
-def from_dh(rows, convention="standard", name="arm", hands=None, carries=None, **options):
+def from_dh(
+    rows: Sequence[Mapping[str, Any]],
+    convention: str = "standard",
+    name: str = "arm",
+    hands: Mapping[str, Sequence[Mapping[str, Any]]] | None = None,
+    carries: Mapping[str, Sequence[str]] | None = None,
+    **options: Any,
+) -> GeneralRobot:
     """The GeneralRobot of rows as `serial` takes them, with a_mm, d_mm, alpha_deg, theta_deg and rpy_deg.
 
     A row whose joint has a drive of its own states its range_deg, or range_mm where it slides, and may state home_deg
@@ -32,7 +43,7 @@ def from_dh(rows, convention="standard", name="arm", hands=None, carries=None, *
     return with_hands(arms, 1 + len(rows), carries)
 
 
-def _chain(rows, convention, name, options):
+def _chain(rows: Sequence[Mapping[str, Any]], convention: str, name: str, options: Mapping[str, Any]) -> GeneralRobot:
     """The GeneralRobot of one arm's rows."""
     plain, ranges, homes = [], [], []
     for number, row in enumerate(rows, 1):
@@ -54,7 +65,7 @@ def _chain(rows, convention, name, options):
     return serial(plain, ranges, homes, modified=convention == "modified", name=name, **options)
 
 
-def _plain(row, where):
+def _plain(row: Mapping[str, Any], where: str) -> dict[str, Any]:
     """A row as `serial` takes it."""
     result = {}
     for key, value in row.items():

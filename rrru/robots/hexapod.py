@@ -4,14 +4,25 @@ Each leg is a bar between two ball joints, whose length is the actuator value. W
 and one of the length, 42 numbers describe its errors. Lengths in mm, angles in rad.
 """
 
+from typing import Any
+
 import numpy as np
+import numpy.typing as npt
 
 from rrru.errors import ConfigError
+from rrru.kinematics.arrays import FloatArray
 from rrru.kinematics.general_robot import GeneralRobot
 from rrru.kinematics.legs import Bar, Drive, Joint, Leg, Legs, Parts, unit_twist
 
 
-def hexapod(base_mm, platform_mm, height_mm, stroke_mm=100.0, name="hexapod", **options):
+def hexapod(
+    base_mm: npt.ArrayLike,
+    platform_mm: npt.ArrayLike,
+    height_mm: float,
+    stroke_mm: float = 100.0,
+    name: str = "hexapod",
+    **options: Any,
+) -> GeneralRobot:
     """The GeneralRobot of joints base_mm (6, 3) on the base and platform_mm (6, 3) on the platform.
 
     height_mm: of the platform's frame over the base's in its home pose, from which a leg's length changes by up to
@@ -33,7 +44,7 @@ def hexapod(base_mm, platform_mm, height_mm, stroke_mm=100.0, name="hexapod", **
     )
 
 
-def driven_bars(base_mm, platform_mm):
+def driven_bars(base_mm: FloatArray, platform_mm: FloatArray) -> tuple[Leg, ...]:
     """Legs of bars with driven lengths from joints (k, 3) on the base to joints (k, 3) on the platform."""
     return tuple(
         Leg(f"leg {k}", (Joint(f"leg {k} root"), Joint(f"leg {k} base", shift_mm=near)), bar=Bar(0.0, far, k - 1))
@@ -41,7 +52,7 @@ def driven_bars(base_mm, platform_mm):
     )
 
 
-def bar_parts(bars):
+def bar_parts(bars: tuple[Leg, ...]) -> Parts:
     """Parts of driven bars: each is a drive and a member."""
     drives = tuple(Drive(f"l{k}_mm", "mm", bar.bar_sites[0], unit_twist(0)) for k, bar in enumerate(bars, 1))
     return Parts(drives=drives, members=tuple((bar.bar_sites[0],) for bar in bars))

@@ -20,6 +20,7 @@ and tangential coordinates u, v of P, b_i = u_i - a + D_i, D_i = sqrt(L^2 - v_i^
 horizontal rails an error of R - r is a common one of the sliders. Lengths in mm, angles in rad.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import ClassVar
@@ -27,8 +28,11 @@ from typing import ClassVar
 import numpy as np
 
 from rrru.errors import ConfigError
-from rrru.kinematics.dynamics import PER_NEWTON
-from rrru.kinematics.legs import Joint, Legs, Parts, X, Y, Z, turn_about
+from rrru.kinematics.arrays import FloatArray
+from rrru.kinematics.chain import Poses
+from rrru.kinematics.dynamics import PER_NEWTON, Masses
+from rrru.kinematics.legs import Joint, Leg, Legs, Parts, X, Y, Z, turn_about
+from rrru.kinematics.point_masses import DriveMotion
 from rrru.parameters import LEGS
 from rrru.robots.three_legs import Deviation, of_each_leg, of_three_legs, points, three_drives
 from rrru.robots.tripod import BARS, Tripod, pair_of_bars
@@ -64,7 +68,7 @@ class Ptt3(Tripod):
     RICHEST = "rails"
     DIMENSIONS = ("L_mm", "R_mm", "r_mm", "spacing_mm")
     DEVIATIONS = _SLIDERS | _LINKS | _RAILS | {"dL": Deviation(1), "da": Deviation(2)}
-    PARAMETER_NAMES: ClassVar = {
+    PARAMETER_NAMES: ClassVar[Mapping[str, tuple[str, ...]]] = {
         "zero": (*_SLIDERS,),
         "tied": (*_SLIDERS, "dL"),
         "legs": (*_SLIDERS, *_LINKS),
@@ -87,25 +91,26 @@ class Ptt3(Tripod):
         members=BARS,
     )
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         super().__post_init__()
         if not 0.0 <= self.rail_inclination_rad <= np.pi / 2.0 + 1e-12:
             raise ConfigError(f"ptt3: rail_inclination_rad is {self.rail_inclination_rad}; allowed: 0 to pi / 2")
 
     @property
-    def angle_arm_mm(self):
+    def angle_arm_mm(self) -> float:
         """Length that makes deviations of angles comparable with those of lengths."""
         return self.R_mm
 
     @property
-    def reach_mm(self):
+    def reach_mm(self) -> float:
         """Length of a link."""
         return self.L_mm
 
     @cached_property
-    def legs(self):
+    def legs(self) -> Legs:
         """Six bars, two on every carriage, side by side."""
-        rise, bars = turn_about(-Y, self.rail_inclination_rad), []
+        rise = turn_about(-Y, self.rail_inclination_rad)
+        bars: list[Leg] = []
         for leg, azimuth, (zero, link, offset, *_) in zip(LEGS, self.azimuth_rad, self.nominal_legs, strict=True):
             root = turn_about(Z, azimuth)
             carriage = (
@@ -122,56 +127,58 @@ class Ptt3(Tripod):
         return Legs(tuple(bars), np.full(3, self.L_mm / 2.0))
 
     @cached_property
-    def nominal_legs(self):
+    def nominal_legs(self) -> FloatArray:
         """Numbers of the legs (3, 6) without deviations."""
         return np.tile([0.0, self.L_mm, self.R_mm - self.r_mm, 0.0, 0.0, 0.0], (3, 1))
 
-    def inverse_of_legs(self, position_mm, legs, sign=1.0):
+    def inverse_of_legs(self, position_mm: FloatArray, legs: FloatArray, sign: float = 1.0) -> FloatArray:
         """Slider positions (n, 3) in mm under leg numbers (3, 6) by the root of that sign (eq. 2); NaN out of reach."""
         outward, _, rail = self._directions(legs)
         w = legs[:, 2, None] * outward - points(position_mm)[:, None, :]
         along = (w * rail).sum(axis=-1)
         with np.errstate(invalid="ignore"):
             # beyond the reach the root gives NaN, which is the mask the callers rely on
-            return -along + sign * np.sqrt(along**2 - (w**2).sum(axis=-1) + legs[:, self.LINK] ** 2) - legs[:, 0]
+            root = np.sqrt(along**2 - (w**2).sum(axis=-1) + legs[:, self.LINK] ** 2)
+            return np.asarray(-along + sign * root - legs[:, 0])
 
-    def ends(self, slider_mm, legs):
+    def ends(self, slider_mm: FloatArray, legs: FloatArray) -> FloatArray:
         """Links' driven ends less the platform's radius, (..., n, 3 legs, 3) in mm, for slider positions (n, 3)."""
         outward, _, rail = self._directions(legs)
         return legs[..., 2, None] * outward + (slider_mm + legs[..., 0])[..., None] * rail
 
-    def end_rates(self, slider_mm, legs):
+    def end_rates(self, slider_mm: FloatArray, legs: FloatArray) -> FloatArray:
         """Derivative (n, 3 legs, 3 axes, 6) of `ends` by the legs' numbers (3, 6)."""
         outward, sideways, rail = self._directions(legs)
         along = (slider_mm + legs[:, 0])[..., None]
         rise, swing = self.rail_inclination_rad + legs[:, 4, None], legs[:, 5, None]
-        up = np.array([0.0, 0.0, 1.0])
         shape = np.broadcast_shapes(along.shape, rail.shape)
         columns = [
             rail,
             np.zeros(3),
             outward,
             legs[:, 2, None] * sideways + along * (np.cos(swing) * np.cos(rise) * sideways - np.sin(swing) * outward),
-            along * np.cos(swing) * (np.cos(rise) * up - np.sin(rise) * outward),
-            along * (np.cos(swing) * sideways - np.sin(swing) * (np.cos(rise) * outward + np.sin(rise) * up)),
+            along * np.cos(swing) * (np.cos(rise) * Z - np.sin(rise) * outward),
+            along * (np.cos(swing) * sideways - np.sin(swing) * (np.cos(rise) * outward + np.sin(rise) * Z)),
         ]
         return np.stack([np.broadcast_to(column, shape) for column in columns], axis=-1)
 
-    def rails(self, deviations=None):
+    def rails(self, deviations: FloatArray | None = None) -> FloatArray:
         """Unit directions (3 legs, 3) in which the sliders count up."""
         return self._directions(self.numbers(deviations))[2]
 
-    def own_load(self, masses, motion, _poses, gravity_mm_s2):
+    def own_load(self, masses: Masses, motion: DriveMotion, _poses: Poses, gravity_mm_s2: FloatArray) -> FloatArray:
         """Forces (n, 3) in N of the carriages' own masses along their rails; see `rrru.kinematics.dynamics`."""
         along = self.rails() @ gravity_mm_s2
         return (masses.arm_kg + 0.5 * masses.forearm_kg) * (along - motion[2]) / PER_NEWTON
 
-    def jacobian(self, position_mm, slider_mm, deviations=None):
+    def jacobian(
+        self, position_mm: FloatArray, slider_mm: FloatArray, deviations: FloatArray | None = None
+    ) -> FloatArray:
         """J (n, 3, 3) of db = J dp, exact at slider positions that fit the position (eqs. 4, 10)."""
         link = self.link_directions(position_mm, slider_mm, deviations)
-        return link / (link * self.rails(deviations)).sum(axis=-1, keepdims=True)
+        return np.asarray(link / (link * self.rails(deviations)).sum(axis=-1, keepdims=True))
 
-    def determinant_factors(self, position_mm):
+    def determinant_factors(self, position_mm: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Z, kappa and D (3) of det J = -Z kappa / (D_1 D_2 D_3), each over n points, D (n, 3); horizontal rails only.
 
         Raises ConfigError for other rails.
@@ -189,12 +196,12 @@ class Ptt3(Tripod):
             kappa += np.sqrt(0.75) * (d[:, j] * d[:, k] + v[:, j] * v[:, k]) + 0.5 * across
         return position[:, 2], kappa, d
 
-    def _directions(self, legs):
+    def _directions(self, legs: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Outward, sideways and rail direction of every leg, each (..., 3 legs, 3), under leg numbers (..., 3, 6)."""
         azimuth, swing = np.asarray(self.azimuth_rad) + legs[..., 3], legs[..., 5, None]
         rise = self.rail_inclination_rad + legs[..., 4, None]
         zero = np.zeros_like(azimuth)
         outward = np.stack([np.cos(azimuth), np.sin(azimuth), zero], axis=-1)
         sideways = np.stack([-np.sin(azimuth), np.cos(azimuth), zero], axis=-1)
-        upright = np.cos(rise) * outward + np.sin(rise) * np.array([0.0, 0.0, 1.0])
+        upright = np.cos(rise) * outward + np.sin(rise) * Z
         return outward, sideways, np.cos(swing) * upright + np.sin(swing) * sideways

@@ -5,22 +5,34 @@ the innermost one and vectorises, and `legs` has the columns of `rrru.robots.rrr
 in rad.
 """
 
-import numba
 import numpy as np
+
+from rrru.kinematics.arrays import FloatArray
+from rrru.kinematics.typed_numba import njit
 
 # A Newton step of this size (mm^2, squared) leaves an error far below 1e-9 mm, since convergence is quadratic with a
 # constant of about 1 / (link length): (1e-4)^2 / 100 = 1e-10.
 _LAST_STEP_SQUARED = 1e-8
 _MOST_STEPS = 25
 
-_compiled = numba.njit(cache=True, error_model="numpy", fastmath={"contract"})
+# of a leg: cosine and sine of its azimuth and of its drive's offset; lengths
+_Leg = tuple[float, float, float, float, tuple[float, float, float, float]]
+
+_compiled = njit(cache=True, error_model="numpy", fastmath={"contract"})
 # inlined by its caller: a separate copy would contract products in another way, and freshly compiled code would give
 # other last bits than the same code loaded from the cache
-_part = numba.njit(forceinline=True, error_model="numpy", fastmath={"contract"})
+_part = njit(forceinline=True, error_model="numpy", fastmath={"contract"})
 
 
 @_part
-def _newton_step(legs, turn, cosine, sine, position, step_squared):
+def _newton_step(
+    legs: FloatArray,
+    turn: FloatArray,
+    cosine: FloatArray,
+    sine: FloatArray,
+    position: FloatArray,
+    step_squared: FloatArray,
+) -> None:
     """One Newton step of all points on the closures (eq. 8), in place; squared step lengths go to `step_squared`."""
     first, second, third = _leg(legs, turn, 0), _leg(legs, turn, 1), _leg(legs, turn, 2)
     for j in range(position.shape[1]):
@@ -42,16 +54,16 @@ def _newton_step(legs, turn, cosine, sine, position, step_squared):
 
 
 # not contracted: a square that is rounded by itself gives the same bits wherever the legs come from
-@numba.njit(cache=True, error_model="numpy")
-def _leg(legs, turn, k):
+@njit(cache=True, error_model="numpy")
+def _leg(legs: FloatArray, turn: FloatArray, k: int) -> _Leg:
     """Numbers of one leg that stay over the points: azimuth and drive as cosines and sines, lengths."""
     angle, forearm = legs[k, 0], legs[k, 3]
     lengths = legs[k, 1], legs[k, 2], forearm * forearm, legs[k, 4]
     return turn[0, k], turn[1, k], np.cos(angle), np.sin(angle), lengths
 
 
-@numba.njit(inline="always", error_model="numpy", fastmath={"contract"})
-def _leg_row(x, y, z, leg, cosine, sine):
+@njit(inline="always", error_model="numpy", fastmath={"contract"})
+def _leg_row(x: float, y: float, z: float, leg: _Leg, cosine: float, sine: float) -> tuple[float, float, float, float]:
     """Half the closure's gradient with respect to x, y, z and half the closure itself, for one leg at one point."""
     cx, cy, cos_delta, sin_delta, (arm, offset, forearm_squared, radial) = leg
     v = cx * y - cy * x
@@ -65,7 +77,14 @@ def _leg_row(x, y, z, leg, cosine, sine):
 
 
 @_part
-def _solve(legs, turn, cosine, sine, position, step_squared):
+def _solve(
+    legs: FloatArray,
+    turn: FloatArray,
+    cosine: FloatArray,
+    sine: FloatArray,
+    position: FloatArray,
+    step_squared: FloatArray,
+) -> None:
     """Newton on all points, in place, until the longest step is negligible; NaN where it does not converge."""
     n = position.shape[1]
     for iteration in range(_MOST_STEPS):
@@ -84,7 +103,7 @@ def _solve(legs, turn, cosine, sine, position, step_squared):
 
 
 @_compiled
-def forward(legs, turn, cosine, sine, start):
+def forward(legs: FloatArray, turn: FloatArray, cosine: FloatArray, sine: FloatArray, start: FloatArray) -> FloatArray:
     """Positions of n drive-angle triples under m sets of leg numbers.
 
     legs: (m, 3, 5); turn: (2, 3) cosine and sine of the azimuths; cosine, sine: (3, n) of the drive angles; start: (3,
@@ -102,7 +121,7 @@ def forward(legs, turn, cosine, sine, start):
 
 
 @_compiled
-def tripod_mean_distance(ends, radii, measured):
+def tripod_mean_distance(ends: FloatArray, radii: FloatArray, measured: FloatArray) -> FloatArray:
     """Mean distance (m,) of points (n, 3) to `lower_intersection` of spheres at ends (m, n, 3, 3), radii (m, 3)."""
     m, n = ends.shape[0], ends.shape[1]
     result = np.empty(m)

@@ -6,10 +6,12 @@ angles in rad. Every rounding is explicit (`fma`), so that equal arguments give 
 
 from functools import cache
 
-import numba
 import numpy as np
 
+from rrru.kinematics.arrays import FloatArray
 from rrru.kinematics.compiled import Kernel, fma
+from rrru.kinematics.typed_numba import njit
+from rrru.robots.three_legs import ThreeLegs
 
 # A Newton step of this size (mm^2, squared) leaves an error far below 1e-9 mm, since convergence is quadratic with a
 # constant of about 1 / (link length): (1e-4)^2 / 100 = 1e-10.
@@ -19,10 +21,15 @@ _MOST_STEPS = 25
 # without deviations, measured positions, and from here on the positions' derivative by each parameter
 _COSINE, _SINE, _START, _MEASURED, _SLOPE = range(5)
 
-_compiled = numba.njit(cache=True, error_model="numpy")
+# numbers of a leg as `_closure` needs them
+_Leg = tuple[float, float, float, float, float, float, float]
+
+_compiled = njit(cache=True, error_model="numpy")
 
 
-def arrays(mechanism, angles_rad, nominal_mm, measured_mm):
+def arrays(
+    mechanism: ThreeLegs, angles_rad: FloatArray, nominal_mm: FloatArray, measured_mm: FloatArray
+) -> tuple[FloatArray, FloatArray]:
     """Arguments `legs` and `points` of the kernel.
 
     angles_rad, nominal_mm, measured_mm (n, 3): drive angles, positions without deviations and measured ones.
@@ -36,13 +43,13 @@ def arrays(mechanism, angles_rad, nominal_mm, measured_mm):
 
 
 @cache
-def kernel():
+def kernel() -> Kernel:
     """The compiled objective, see `rrru.kinematics.compiled`."""
     return Kernel(_mean_distance)
 
 
 @_compiled
-def _closure(leg, x, y, z, cosine, sine):
+def _closure(leg: _Leg, x: float, y: float, z: float, cosine: float, sine: float) -> tuple[float, float, float, float]:
     """Half the gradient of a leg's closure (eq. 8) at x, y, z and the closure, all times s = sqrt(L3^2 - v^2)."""
     cx, cy = leg[5], leg[6]
     arm_cosine, arm_sine = leg[0], leg[1]
@@ -57,13 +64,13 @@ def _closure(leg, x, y, z, cosine, sine):
 
 
 @_compiled
-def _numbers(leg):
+def _numbers(leg: FloatArray) -> _Leg:
     """The seven numbers of a leg as a tuple."""
     return leg[0], leg[1], leg[2], leg[3], leg[4], leg[5], leg[6]
 
 
 @_compiled
-def _newton_step(legs, points, position, squared):
+def _newton_step(legs: FloatArray, points: FloatArray, position: FloatArray, squared: FloatArray) -> None:
     """One Newton step of all points on the three closures, in place; the squared step lengths go to `squared`."""
     first, second, third = _numbers(legs[0]), _numbers(legs[1]), _numbers(legs[2])
     cosine, sine, n = points[_COSINE], points[_SINE], squared.size
@@ -84,7 +91,7 @@ def _newton_step(legs, points, position, squared):
 
 
 @_compiled
-def _start(legs, deviation, points, own, position):
+def _start(legs: FloatArray, deviation: FloatArray, points: FloatArray, own: FloatArray, position: FloatArray) -> None:
     """Numbers of the legs (3, 7) as `_closure` needs them, and positions (3 n,) linear in the deviation (p,)."""
     for leg in range(3):
         for c in range(7):
@@ -103,7 +110,7 @@ def _start(legs, deviation, points, own, position):
             position[j] = fma(deviation[q + 1], points[_SLOPE + q + 1, j], first)
 
 
-def _mean_distance(deviations, legs, points, values):
+def _mean_distance(deviations: FloatArray, legs: FloatArray, points: FloatArray, values: FloatArray) -> None:
     """Paper A, eq. (11) in mm for deviations (m, p), written to values (m,); inf where a point left the reach."""
     n = points.shape[1] // 3
     own, position, work, measured = np.empty((3, 7)), np.empty(3 * n), np.empty(n), points[_MEASURED]

@@ -8,12 +8,16 @@ Belts and rods couple joints to several drives: the joints' values are C q with 
 angles in rad.
 """
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
 from rrru.errors import ConfigError
+from rrru.kinematics.arrays import FloatArray
 from rrru.kinematics.general_robot import GeneralRobot
 from rrru.kinematics.inverse import end_of
 from rrru.kinematics.legs import TOOL, WORLD, Drive, Joint, Leg, Legs, Parts, X, Z, turn_about, unit_twist
@@ -26,7 +30,15 @@ FRAME = ("xyz_mm", "rpy_rad", "mass_kg", "com_mm")
 _TAKEN = (WORLD, TOOL, "base", "flange")
 
 
-def serial(rows, drive_range, home, modified=False, tool_mm=(0.0, 0.0, 0.0), name="arm", **options):
+def serial(
+    rows: Sequence[Mapping[str, Any]],
+    drive_range: npt.ArrayLike,
+    home: npt.ArrayLike,
+    modified: bool = False,
+    tool_mm: Sequence[float] = (0.0, 0.0, 0.0),
+    name: str = "arm",
+    **options: Any,
+) -> GeneralRobot:
     """The GeneralRobot of DH rows, mappings of a, d in mm and alpha, theta in rad; absent ones are 0.
 
     A row's joint turns by q + theta or, with sliding: true, slides by q + d. It is called `name`, by default "q" and
@@ -52,12 +64,13 @@ def serial(rows, drive_range, home, modified=False, tool_mm=(0.0, 0.0, 0.0), nam
     coupled = None if np.array_equal(matrix, np.eye(len(matrix))) else matrix
     legs = Legs((leg,), np.asarray(home, dtype=float), coupling=coupled)
     end = end_of(legs, leg, legs.home_drives[None])
+    x, y, z = tool_mm
     return GeneralRobot(
         name=name,
         legs=replace(legs, home_mm=end.position_mm[0], home_turn=end.turn[0]),
         parts=_parts([link for link in links if link.name], coupling),
         drive_range=np.asarray(drive_range, dtype=float),
-        tool_mm=tuple(tool_mm),
+        tool_mm=(x, y, z),
         point_masses=tuple(point_masses),
         **options,
     )
@@ -73,25 +86,25 @@ class _Link:
     site: str
     name: str
     kind: str
-    shift_mm: np.ndarray
-    turn: np.ndarray
-    after: tuple
-    drives: dict
+    shift_mm: FloatArray
+    turn: FloatArray
+    after: tuple[FloatArray, FloatArray]
+    drives: dict[str, float]
     mass_kg: float = 0.0
-    com_mm: tuple = (0.0, 0.0, 0.0)
+    com_mm: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     @property
-    def unit(self):
+    def unit(self) -> str:
         """Unit of its joint's value."""
         return "mm" if self.kind == "P" else "rad"
 
     @property
-    def twist(self):
+    def twist(self) -> FloatArray:
         """Twist (6,) of a unit of its joint's value."""
         return unit_twist(2 if self.kind == "P" else 5)
 
 
-def _links(rows, modified, robot):
+def _links(rows: Sequence[Mapping[str, Any]], modified: bool, robot: str) -> list[_Link]:
     """The _Links of all rows."""
     result = []
     for number, row in enumerate(rows, 1):
@@ -115,7 +128,7 @@ def _links(rows, modified, robot):
     return result
 
 
-def _coupling(joints, robot):
+def _coupling(joints: Sequence[_Link], robot: str) -> dict[str, FloatArray]:
     """Columns (D,) of the coupling by drive, in the order of the joints that have a drive of their own."""
     names = [*_TAKEN, *(link.name for link in joints)]
     if len(set(names)) < len(names):
@@ -134,7 +147,7 @@ def _coupling(joints, robot):
     return {drive: np.array([link.drives.get(drive, 0.0) for link in joints]) for drive in drives}
 
 
-def _parts(joints, coupling):
+def _parts(joints: Sequence[_Link], coupling: Mapping[str, FloatArray]) -> Parts:
     """The Parts: drives, each with its own joint and the joints that follow it, and followers without drives."""
     result = []
     for drive, column in coupling.items():

@@ -10,6 +10,10 @@ from functools import cached_property
 
 import cv2
 import numpy as np
+import numpy.typing as npt
+from cv2.typing import MatLike
+
+from rrru.kinematics.arrays import FloatArray
 
 # ASSUME the paper does not show its grey values: dark dots on a bright plate, which is larger than the dots' field
 _PLATE, _DOT = 215.0, 40.0
@@ -32,10 +36,10 @@ class Target:
     rows: int
     pitch_mm: float
     diameter_mm: float
-    offsets_mm: np.ndarray
+    offsets_mm: FloatArray
 
     @property
-    def middle_mm(self):
+    def middle_mm(self) -> FloatArray:
         """Middle (3,) of the dots' field."""
         return self.pitch_mm * np.array([self.columns - 1.0, self.rows - 1.0, 0.0]) / 2.0
 
@@ -58,28 +62,29 @@ class Camera:
     noise_grey: float = 1.5
 
     @property
-    def focal_px(self):
+    def focal_px(self) -> float:
         """Focal length in pixels."""
         return self.focal_mm / self.pixel_mm
 
     @property
-    def centre_px(self):
+    def centre_px(self) -> FloatArray:
         """Where the optical axis meets the chip, (2,)."""
         return (np.array([self.width_px, self.height_px]) - 1.0) / 2.0 + self.centre_offset_px
 
     @property
-    def matrix(self):
+    def matrix(self) -> FloatArray:
         """Camera matrix (3, 3) in pixels."""
         (x, y), focal = self.centre_px, self.focal_px
         return np.array([[focal, 0.0, x], [0.0, focal, y], [0.0, 0.0, 1.0]])
 
-    def project(self, points_mm):
+    def project(self, points_mm: FloatArray) -> FloatArray:
         """Pixels (n, 2) of points (n, 3) of the camera frame."""
         points, still = np.asarray(points_mm, dtype=float), np.zeros(3)
-        return cv2.projectPoints(points, still, still, self.matrix, np.array(self.distortion))[0][:, 0]
+        pixels, _ = cv2.projectPoints(points, still, still, self.matrix, np.array(self.distortion))
+        return np.asarray(pixels[:, 0], dtype=float)
 
     @cached_property
-    def rays(self):
+    def rays(self) -> FloatArray:
         """Normalised coordinates (2, fine rows, fine columns) of the ray to every sample of the chip."""
         offset = (np.arange(_FINE) + 0.5) / _FINE - 0.5
         across = (np.arange(self.width_px)[:, None] + offset).ravel()
@@ -89,7 +94,9 @@ class Camera:
         return np.ascontiguousarray(rays.reshape(len(down), len(across), 2).transpose(2, 0, 1))
 
 
-def render(camera, target, rotation, translation_mm, generator):
+def render(
+    camera: Camera, target: Target, rotation: FloatArray, translation_mm: FloatArray, generator: np.random.Generator
+) -> npt.NDArray[np.uint8]:
     """Image (height, width) of 8 bits that the camera takes of the target.
 
     rotation (3, 3), translation_mm (3,): from the target's frame to the camera's. generator: numpy Generator of the
@@ -99,16 +106,17 @@ def render(camera, target, rotation, translation_mm, generator):
     rays = camera.rays
     # a few rows at a time stay in the processor's cache
     blocks = [_greys(camera, target, to_plane, *rays[:, k : k + _ROWS]) for k in range(0, rays.shape[1], _ROWS)]
-    fine = np.concatenate(blocks, dtype=np.float32, casting="same_kind")
+    fine: MatLike = np.concatenate(blocks, dtype=np.float32, casting="same_kind")
     if camera.blur_px > 0.0:
         fine = cv2.GaussianBlur(fine, (0, 0), camera.blur_px * _FINE, borderType=cv2.BORDER_REPLICATE)
     size = camera.width_px, camera.height_px
     image = cv2.resize(fine.astype(float), size, interpolation=cv2.INTER_AREA)
     noisy = image + camera.noise_grey * generator.standard_normal(image.shape)
-    return np.clip(np.rint(noisy), 0.0, 255.0).astype(np.uint8)
+    greys: npt.NDArray[np.uint8] = np.clip(np.rint(noisy), 0.0, 255.0).astype(np.uint8)
+    return greys
 
 
-def _greys(camera, target, to_plane, x, y):
+def _greys(camera: Camera, target: Target, to_plane: FloatArray, x: FloatArray, y: FloatArray) -> FloatArray:
     """Grey (m, k) of the target on rays x, y (m, k); to_plane (3, 3): from rays to the target's plane."""
     across, up, scale = (row[0] * x + row[1] * y + row[2] for row in to_plane)
     across, up = across / scale, up / scale
@@ -120,4 +128,4 @@ def _greys(camera, target, to_plane, x, y):
     distance = np.sqrt(across * across + up * up)
     # the depth is 1 / scale; a sample on a dot's edge is covered by the share of it that lies inside
     covered = np.clip((target.diameter_mm / 2.0 - distance) * scale * camera.focal_px * _FINE + 0.5, 0.0, 1.0)
-    return _PLATE + (_DOT - _PLATE) * covered
+    return np.asarray(_PLATE + (_DOT - _PLATE) * covered)

@@ -1,18 +1,26 @@
 """Interface of every plant: a nominal controller, the robot that it drives, and a tracker."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 
 import numpy as np
+import pandas as pd
 
 from rrru.campaign.measurements import turn_columns, vector_columns
+from rrru.campaign.plan import Plan
 from rrru.effects.motion import Course, make_motion
+from rrru.effects.protocol import Motion
+from rrru.kinematics.arrays import FloatArray
+from rrru.kinematics.chain import Poses
 from rrru.kinematics.dynamics import Masses
 from rrru.kinematics.robot import Robot
 from rrru.simulation.tracker import Sees, measure
 
+# positions (n, 3) in the order driven to actuator values (n, K)
+Controller = Callable[[FloatArray], FloatArray]
 # ASSUME a robot that is read at rest waits so long at every point
 SETTLE_S = 5.0
-_ONLY_TOOL = Sees()
+ONLY_TOOL = Sees()
 
 
 class DrivenRobot(ABC):
@@ -29,10 +37,17 @@ class DrivenRobot(ABC):
     rotation_limit_rad: float
 
     @abstractmethod
-    def posed(self, motion, target):
+    def posed(self, motion: Motion, target: FloatArray) -> tuple[Poses, FloatArray]:
         """Poses (n) near targets (n, 3) along a Motion, and twists (n or 1, sites, 6) of all their errors."""
 
-    def run(self, plan, noise_mm, generator, controller=None, sees=_ONLY_TOOL):
+    def run(
+        self,
+        plan: Plan,
+        noise_mm: float,
+        generator: np.random.Generator,
+        controller: Controller | None = None,
+        sees: Sees = ONLY_TOOL,
+    ) -> tuple[pd.DataFrame, pd.DataFrame]:
         """Drive a plan; returns (measurements, truth) as frames.
 
         controller: positions (n, 3) in the order driven to actuator values (n, 3), by default the nominal inverse
@@ -61,11 +76,11 @@ class DrivenRobot(ABC):
         )
         return measurements, truth.assign(**vector_columns("true", position), platform_rotation_rad=turned[row])
 
-    def motion(self, plan, controller):
+    def motion(self, plan: Plan, controller: Controller) -> Motion:
         """The Motion, input of the effects, of a plan driven through a controller; the nominal mechanism's loads."""
         return make_motion(self.mechanism, self.masses, self.course(plan, controller))
 
-    def course(self, plan, controller):
+    def course(self, plan: Plan, controller: Controller) -> Course:
         """The Course of a plan driven through a controller."""
         path, index = plan.path()
         along = controller(path)
@@ -81,7 +96,7 @@ class DrivenRobot(ABC):
             stops=not any(run.velocity_mm_s.any() for run in plan.runs),
         )
 
-    def positions(self, motion, target=None):
+    def positions(self, motion: Motion, target: FloatArray | None = None) -> tuple[FloatArray, FloatArray]:
         """Platform centres (n, 3) in the tracker's frame and sizes (n,) of its rotation along a motion near targets.
 
         target (n, 3): the commanded positions by default. NaN where the legs do not close near the target or the
@@ -91,15 +106,15 @@ class DrivenRobot(ABC):
         solved = poses.closed & (turned <= self.rotation_limit_rad)
         return np.where(solved[:, None], self.mechanism.measured(poses, twists), np.nan), turned
 
-    def _where(self, motion, target):
+    def _where(self, motion: Motion, target: FloatArray) -> tuple[Poses, FloatArray, FloatArray]:
         """The result of `posed`, and sizes (n,) of the platform's rotation."""
         poses, twists = self.posed(motion, target)
         turned = poses.turned_from(self.mechanism.near(target, motion.drive).turn)
         return poses, twists, np.linalg.norm(turned, axis=1)
 
 
-def non_repeatability(generator, count):
+def non_repeatability(generator: np.random.Generator, count: int) -> FloatArray:
     """Points (count, 3) uniform in the unit ball: an error by clearance from stop to stop, bounded unlike noise."""
     direction = generator.standard_normal((count, 3))
     radius = generator.random((count, 1)) ** (1.0 / 3.0)
-    return radius * direction / np.linalg.norm(direction, axis=1, keepdims=True)
+    return np.asarray(radius * direction / np.linalg.norm(direction, axis=1, keepdims=True))

@@ -8,11 +8,13 @@ and N mm of a hinge, mm and N of a slide.
 Elements that causes add to a model are springs, leashes that leave a clearance, holding friction, and a base: SI units.
 """
 
+from collections.abc import Mapping, Sequence
+
 import mujoco
 import numpy as np
 
 from rrru.errors import ConfigError
-from rrru.simulation.mujoco_model import BASE, LIMITED, MM, SOFTER, SOLIMP, SOLREF, held_sites, set_options
+from rrru.simulation.mujoco_model import BASE, LIMITED, MM, SOFTER, SOLIMP, SOLREF, Edit, Place, held_sites, set_options
 
 _JOINT, _EQ, _OBJ = mujoco.mjtJoint, mujoco.mjtEq, mujoco.mjtObj
 _HINGE, _SLIDE = _JOINT.mjJNT_HINGE, _JOINT.mjJNT_SLIDE
@@ -26,18 +28,18 @@ _SWINGING, _G = 0.5, 9.81
 _BASE_RADIUS_M = 0.3
 
 
-def _zero_offset(edit, site, size):
+def _zero_offset(edit: Edit, site: str, size: float) -> None:
     """A drive's zero is off: rad or mm."""
     drive = _drive(edit, site)
     edit.offsets[drive] = size * edit.units(drive)[0]
 
 
-def _placement(edit, site, size):
+def _placement(edit: Edit, site: str, size: float) -> None:
     """A length or a seat is off, along or about a direction: mm or rad."""
     edit.shifts[_place(edit, site)] = _of_direction(edit, site, size)
 
 
-def _warming(edit, site, size):
+def _warming(edit: Edit, site: str, size: float) -> None:
     """A length or seat moves by this as the robot warms up, as 1 - exp(-t / time_s): mm or rad, and time_s in s."""
     if site == "time_s":
         edit.warming_s = _positive("warming.time_s", size)
@@ -45,7 +47,7 @@ def _warming(edit, site, size):
         edit.grows[_place(edit, site)] = _of_direction(edit, site, size)
 
 
-def _actuator_stiffness(edit, site, size):
+def _actuator_stiffness(edit: Edit, site: str, size: float) -> None:
     """A drive's servo is compliant: kp in N mm/rad or N/mm, damped as the file's."""
     actuator, (length, force) = edit.drives[_drive(edit, site)], edit.units(site)
     kp = _positive(site, size) * force / length
@@ -54,27 +56,27 @@ def _actuator_stiffness(edit, site, size):
     edit.steady(edit.spec.joint(site), kp)
 
 
-def _servo_lag(edit, site, size):
+def _servo_lag(edit: Edit, site: str, size: float) -> None:
     """A drive's servo is slow: damping kv of kp times this in s, which its feedforward does not compensate."""
     actuator = edit.drives[_drive(edit, site)]
     edit.lags[site] = _positive(site, size)
     actuator.biasprm[2] -= size * actuator.gainprm[0]
 
 
-def _speed_friction(edit, site, size):
+def _speed_friction(edit: Edit, site: str, size: float) -> None:
     """Friction in a joint grows with the square of its speed: N mm s^2/rad^2 or N s^2/mm^2."""
     joint, (length, force) = edit.spec.joint(_joint(edit, site)), edit.units(site)
     joint.damping[1] = _positive(site, size) * force / length**2
 
 
-def _joint_friction(edit, site, size):
+def _joint_friction(edit: Edit, site: str, size: float) -> None:
     """Dry friction in a joint: N mm or N."""
     joint = edit.spec.joint(_joint(edit, site))
     joint.frictionloss = _positive(site, size) * edit.units(site)[1]
     joint.solref_friction, joint.solimp_friction = SOLREF, SOLIMP
 
 
-def _play(edit, site, size):
+def _play(edit: Edit, site: str, size: float) -> None:
     """Backlash between a drive's motor and its arm, full width: rad or mm. Friction on the base holds the arm."""
     joint, name = edit.spec.joint(_drive(edit, site)), f"{site} play"
     if len(joint.parent.joints) > 1:
@@ -91,7 +93,7 @@ def _play(edit, site, size):
     arm.solref_friction, arm.solimp_friction = SOLREF, SOLIMP
 
 
-def _play_friction(edit, site, size):
+def _play_friction(edit: Edit, site: str, size: float) -> None:
     """The friction that holds an arm within its backlash: N mm or N; by default enough for its weight."""
     tendon = edit.spec.tendon(f"{_drive(edit, site)} play")
     if tendon is None:
@@ -99,7 +101,7 @@ def _play_friction(edit, site, size):
     tendon.frictionloss = _positive(site, size) * edit.units(site)[1]
 
 
-def _link_stiffness(edit, site, size):
+def _link_stiffness(edit: Edit, site: str, size: float) -> None:
     """A body is compliant against its joint, along or about a direction of its own: N/mm or N mm/rad."""
     body, direction = _body_place(edit, site)
     kind, length, force = (_HINGE, 1.0, 1.0 / MM) if direction > 2 else (_SLIDE, 1.0 / MM, 1.0)
@@ -107,7 +109,7 @@ def _link_stiffness(edit, site, size):
     spring(edit, edit.add_joint(body, name, kind, np.eye(3)[direction % 3]), _positive(site, size) * force / length)
 
 
-def _clearance(edit, site, size):
+def _clearance(edit: Edit, site: str, size: float) -> None:
     """Radial clearance of a hinge, or that of a ball joint or connect in all directions: mm."""
     gap, spec = _positive(site, size) / MM, edit.spec
     if site in [one.name for one in spec.equalities if one.type == _EQ.mjEQ_CONNECT]:
@@ -130,17 +132,17 @@ def _clearance(edit, site, size):
     leash(edit, site, names, gap)
 
 
-def _payload(edit, site, size):
+def _payload(edit: Edit, site: str, size: float) -> None:
     """A mass at a body's centre that the controller does not know: kg."""
     edit.masses[_known(site, [body.name for body in edit.spec.bodies[1:]], "a body")] = _positive(site, size)
 
 
-def _base_tilt(edit, site, size):
+def _base_tilt(edit: Edit, site: str, size: float) -> None:
     """The base is not level: turned about its x or y against gravity, rad."""
     edit.tilt["xy".index(_known(site, ("x", "y"), "x or y"))] = size
 
 
-def _base_stiffness(edit, site, size):
+def _base_stiffness(edit: Edit, site: str, size: float) -> None:
     """The base stands on springs along or about the robot's axes: N/mm or N mm/rad; without one it is rigid."""
     direction = DIRECTIONS.index(_known(site, DIRECTIONS, "a direction"))
     if not edit.prefix:
@@ -171,7 +173,7 @@ CAUSES = {
 MOVING = ("servo_lag", "speed_friction")
 
 
-def apply(edit, causes):
+def apply(edit: Edit, causes: Mapping[str, Mapping[str, float]]) -> None:
     """Change an Edit by causes, {name: {site: size}}; raises ConfigError naming what does not fit."""
     for name in causes:
         if name not in CAUSES:
@@ -186,26 +188,28 @@ def apply(edit, causes):
         raise ConfigError("mujoco.causes.warming: no time_s; allowed: the time constant in s besides the sites")
 
 
-def _known(site, allowed, what):
+def _known(site: str, allowed: Sequence[str], what: str) -> str:
     """The site, if it is one of those allowed."""
     if site not in allowed:
         raise ConfigError(f"{site!r} is not {what}; allowed: {', '.join(allowed)}")
     return site
 
 
-def _positive(site, size):
+def _positive(site: str, size: float) -> float:
     """The size, if it is positive."""
     if not size > 0.0:
         raise ConfigError(f"{site} is {size:g}; allowed: a positive number")
     return size
 
 
-def _drive(edit, site):
+def _drive(edit: Edit, site: str) -> str:
     """The site, if it is a driven joint."""
     return _known(site, tuple(edit.drives), "a drive")
 
 
-def _joint(edit, site, noun="a joint", kinds=(_HINGE, _SLIDE, _JOINT.mjJNT_BALL)):
+def _joint(
+    edit: Edit, site: str, noun: str = "a joint", kinds: Sequence[mujoco.mjtJoint] = (_HINGE, _SLIDE, _JOINT.mjJNT_BALL)
+) -> str:
     """The site, if it is a joint of the file of one of these kinds."""
     nominal = edit.nominal
     return _known(
@@ -213,7 +217,7 @@ def _joint(edit, site, noun="a joint", kinds=(_HINGE, _SLIDE, _JOINT.mjJNT_BALL)
     )
 
 
-def _body_place(edit, site):
+def _body_place(edit: Edit, site: str) -> tuple[str, int]:
     """Body and number of the direction of a site `<body>.<direction>`."""
     name, _, direction = site.rpartition(".")
     bodies = [body.name for body in edit.spec.bodies[1:]]
@@ -222,7 +226,7 @@ def _body_place(edit, site):
     return name, DIRECTIONS.index(direction)
 
 
-def _place(edit, site):
+def _place(edit: Edit, site: str) -> Place:
     """Kind, name and number of the direction of the element that a placement moves."""
     name, _, direction = site.rpartition(".")
     held = [one.name for one in edit.spec.equalities if one.objtype == _OBJ.mjOBJ_SITE]
@@ -231,24 +235,24 @@ def _place(edit, site):
     return "body", *_body_place(edit, site)
 
 
-def _of_direction(edit, site, size):
+def _of_direction(edit: Edit, site: str, size: float) -> float:
     """Size in m or rad of a site that ends in a direction."""
     return size if site.rpartition(".")[2].startswith("r") else size / MM
 
 
-def swinging_frequency(gap):
+def swinging_frequency(gap: float) -> float:
     """Angular frequency in 1/s, times its damping, of a body that hangs in a clearance of this in m."""
-    return _SWINGING * np.sqrt(_G / gap)
+    return float(_SWINGING * np.sqrt(_G / gap))
 
 
-def spring(edit, joint, stiffness):
+def spring(edit: Edit, joint: mujoco.MjsJoint, stiffness: float) -> None:
     """Make a joint a spring of a stiffness in N/m or N m/rad."""
     joint.stiffness[0] = stiffness
     edit.steady(joint, stiffness)
     edit.damped[joint.name.removeprefix(edit.prefix)] = None
 
 
-def leash(edit, name, sites, gap):
+def leash(edit: Edit, name: str, sites: tuple[str, str], gap: float) -> None:
     """Let two sites be as far apart as this in m."""
     tendon = edit.spec.add_tendon(name=f"{name} clearance", limited=LIMITED, range=(0.0, gap))
     edit.leashes[tendon.name] = sites
@@ -257,7 +261,7 @@ def leash(edit, name, sites, gap):
         tendon.wrap_site(site)
 
 
-def damp_swinging(edit, site, gap):
+def damp_swinging(edit: Edit, site: str, gap: float) -> None:
     """Dampers between the two sites of a connect: actuators that only brake, across x, y and z of the second site."""
     first, second = held_sites(site)
     for number, letter in enumerate("xyz"):
@@ -267,7 +271,7 @@ def damp_swinging(edit, site, gap):
         edit.brakes[brake.name] = f"{site} clearance", swinging_frequency(gap)
 
 
-def holding_friction(edit, site):
+def holding_friction(edit: Edit, site: str) -> float:
     """Friction in N m or N that holds the arm of a drive: more than its load at home."""
     model, data = edit.nominal, mujoco.MjData(edit.nominal)
     for number in range(model.njnt):
@@ -281,10 +285,10 @@ def holding_friction(edit, site):
     places = np.vstack([data.xipos[behind], data.body(edit.platform).xpos]) - data.joint(site).xanchor
     lever = np.linalg.norm(np.cross(data.joint(site).xaxis, places), axis=1)
     share = (weight.sum() if joint.type[0] == _SLIDE else weight @ lever) / (len(edit.drives) if loops else 1)
-    return _HOLDS * abs(_static_load(edit, data)[site]) + share
+    return float(_HOLDS * abs(_static_load(edit, data)[site]) + share)
 
 
-def _static_load(edit, data):
+def _static_load(edit: Edit, data: mujoco.MjData) -> dict[str, float]:
     """Load of the drives in N m or N in a pose at rest, by joint: the bias that loops cannot bear."""
     model = edit.nominal
     dofs = [model.joint(name).dofadr[0] for name in edit.drives]
@@ -295,14 +299,14 @@ def _static_load(edit, data):
     return dict(zip(edit.drives, np.linalg.lstsq(bearing.T, data.qfrc_bias)[0], strict=False))
 
 
-def _hangs_on(model, body, first):
+def _hangs_on(model: mujoco.MjModel, body: int, first: int) -> bool:
     """Whether a body is another one or hangs on it."""
     while body > first:
         body = model.body_parentid[body]
     return body == first
 
 
-def put_on_base(edit):
+def put_on_base(edit: Edit) -> None:
     """Put all bodies of the world on a base body; free bodies get slides and a ball joint instead."""
     for body in edit.spec.worldbody.bodies:
         if [one.type for one in body.joints] == [_JOINT.mjJNT_FREE]:
@@ -316,7 +320,7 @@ def put_on_base(edit):
     edit.spec, edit.prefix = model, "robot "
 
 
-def _unfree(edit, body):
+def _unfree(edit: Edit, body: mujoco.MjsBody) -> None:
     """Three slides and a ball joint of the same pose at home in place of a free joint."""
     (free,), nominal = body.joints, edit.nominal.body(body.name)
     values, name = edit.home.pop(free.name), free.name

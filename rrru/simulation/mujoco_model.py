@@ -5,13 +5,17 @@ constraints are as stiff as MuJoCo allows at this step: they yield with the squa
 Contacts and keyframes are left out; home is the first keyframe's pose, else the reference configuration.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
+import numpy.typing as npt
 
 from rrru.errors import ConfigError
+from rrru.kinematics.arrays import FloatArray
 
 MM = 1000.0
 STEP_S = 2e-4
@@ -22,6 +26,9 @@ LIMITED = mujoco.mjtLimited.mjLIMITED_TRUE
 PAYLOAD, BASE = "rrru payload", "rrru base"
 _EQ, _JOINT, _OBJ = mujoco.mjtEq, mujoco.mjtJoint, mujoco.mjtObj
 _SIZES = {_JOINT.mjJNT_FREE: 7, _JOINT.mjJNT_BALL: 4}
+
+# kind ("body" or "site"), name and number of the direction of what a placement moves
+Place = tuple[str, str, int]
 
 
 @dataclass
@@ -41,41 +48,43 @@ class Edit:
     spec: mujoco.MjSpec
     nominal: mujoco.MjModel
     platform: str
-    home: dict
-    drives: dict
-    servos: dict
-    lengths: dict
+    home: dict[str, FloatArray]
+    drives: dict[str, mujoco.MjsActuator]
+    servos: dict[str, str]
+    lengths: dict[str, float]
     payload_kg: float = 0.0
-    damped: dict = field(default_factory=dict)
-    shifts: dict = field(default_factory=dict)
-    grows: dict = field(default_factory=dict)
+    damped: dict[str, float | None] = field(default_factory=dict)
+    shifts: dict[Place, float] = field(default_factory=dict)
+    grows: dict[Place, float] = field(default_factory=dict)
     warming_s: float | None = None
-    offsets: dict = field(default_factory=dict)
-    masses: dict = field(default_factory=dict)
-    tilt: np.ndarray = field(default_factory=lambda: np.zeros(3))
-    lags: dict = field(default_factory=dict)
-    seats: dict = field(default_factory=dict)
-    leashes: dict = field(default_factory=dict)
-    brakes: dict = field(default_factory=dict)
+    offsets: dict[str, float] = field(default_factory=dict)
+    masses: dict[str, float] = field(default_factory=dict)
+    tilt: FloatArray = field(default_factory=lambda: np.zeros(3))
+    lags: dict[str, float] = field(default_factory=dict)
+    seats: dict[str, str] = field(default_factory=dict)
+    leashes: dict[str, tuple[str, str]] = field(default_factory=dict)
+    brakes: dict[str, tuple[str, float]] = field(default_factory=dict)
     prefix: str = ""
 
-    def units(self, joint):
+    def units(self, joint: str) -> tuple[float, float]:
         """Factors from mm or rad of a joint, and from N or N mm on it, to the file's units."""
         return (1.0 / MM, 1.0) if self.spec.joint(joint).type == _JOINT.mjJNT_SLIDE else (1.0, 1.0 / MM)
 
-    def add_joint(self, body, name, kind, axis, **options):
+    def add_joint(
+        self, body: str, name: str, kind: mujoco.mjtJoint, axis: npt.ArrayLike, **options: Any
+    ) -> mujoco.MjsJoint:
         """Add a hinge or slide behind the other joints of a body, and the free dof's rest to home."""
         joint = self.spec.body(body).add_joint(name=self.prefix + name, type=kind, axis=axis, **options)
         joint.solref_limit, joint.solimp_limit = SOFTER, SOLIMP
         self.home[name] = np.zeros(1)
         return joint
 
-    def steady(self, joint, stiffness):
+    def steady(self, joint: mujoco.MjsJoint, stiffness: float) -> None:
         """Give a joint the inertia that an explicit step needs under a spring; it has no weight."""
         joint.armature = max(joint.armature, stiffness * STEP_S**2)
 
 
-def read(file, platform, tool_mm, drives):
+def read(file: str | Path, platform: str, tool_mm: Sequence[float], drives: Sequence[str]) -> Edit:
     """The Edit of an MJCF without causes; raises ConfigError where a drive has no position actuator.
 
     tool_mm (3,): where the payload hangs in the platform's frame; drives: names of the driven joints.
@@ -91,16 +100,16 @@ def read(file, platform, tool_mm, drives):
     _hold_between_sites(spec, nominal)
     spec.body(platform).add_body(name=PAYLOAD, pos=np.asarray(tool_mm) / MM)
     set_options(spec, nominal.opt.gravity)
-    drives = _servos(spec, Path(file), drives)
-    servos = {joint: servo.name for joint, servo in drives.items()}
+    actuators = _servos(spec, Path(file), drives)
+    servos = {joint: servo.name for joint, servo in actuators.items()}
     lengths = {joint: 1.0 / MM if spec.joint(joint).type == _JOINT.mjJNT_SLIDE else 1.0 for joint in drives}
-    edit = Edit(spec, nominal, platform, home, drives, servos, lengths)
-    for joint, servo in drives.items():
+    edit = Edit(spec, nominal, platform, home, actuators, servos, lengths)
+    for joint, servo in actuators.items():
         edit.steady(spec.joint(joint), servo.gainprm[0])
     return edit
 
 
-def set_options(spec, gravity):
+def set_options(spec: mujoco.MjSpec, gravity: FloatArray) -> None:
     """Set the options common to all robots: step, integrator, solver, and gravity (3,) in m/s^2."""
     option = spec.option
     option.timestep, option.integrator = STEP_S, mujoco.mjtIntegrator.mjINT_IMPLICITFAST
@@ -109,7 +118,7 @@ def set_options(spec, gravity):
     option.gravity = gravity
 
 
-def _name_all(spec):
+def _name_all(spec: mujoco.MjSpec) -> None:
     """Give names to elements without one, so that all can be found again."""
     for number, body in enumerate(spec.bodies):
         body.name = body.name or f"body {number}"
@@ -120,13 +129,13 @@ def _name_all(spec):
             element.name = element.name or f"{kind} {number}"
 
 
-def _values(model, joint, qpos):
+def _values(model: mujoco.MjModel, joint: int, qpos: FloatArray) -> FloatArray:
     """Values of qpos of one joint."""
     first = int(model.jnt_qposadr[joint])
     return np.array(qpos[first : first + _SIZES.get(_JOINT(int(model.jnt_type[joint])), 1)])
 
 
-def _servos(spec, file, drives):
+def _servos(spec: mujoco.MjSpec, file: Path, drives: Sequence[str]) -> dict[str, mujoco.MjsActuator]:
     """Position actuators of the driven joints by their names."""
     found = {actuator.target: actuator for actuator in spec.actuators}
     for joint in drives:
@@ -136,7 +145,7 @@ def _servos(spec, file, drives):
     return {joint: found[joint] for joint in drives}
 
 
-def _hold_between_sites(spec, nominal):
+def _hold_between_sites(spec: mujoco.MjSpec, nominal: mujoco.MjModel) -> None:
     """Make connects and welds hold two named sites together where the file's bodies meet; stiffen all equalities."""
     for equality in spec.equalities:
         equality.solref, equality.solimp = SOLREF, SOLIMP
@@ -157,6 +166,6 @@ def _hold_between_sites(spec, nominal):
         equality.objtype, equality.name1, equality.name2 = _OBJ.mjOBJ_SITE, *names
 
 
-def held_sites(equality):
+def held_sites(equality: str) -> tuple[str, str]:
     """Names of the two sites that a connect or weld holds together."""
     return f"{equality} first", f"{equality} second"

@@ -11,7 +11,7 @@ from rrru.simulation.mujoco_model import MM
 _ROUND = {int(mujoco.mjtGeom.mjGEOM_CAPSULE), int(mujoco.mjtGeom.mjGEOM_CYLINDER)}
 
 
-def solids(file):
+def solids(file: str | Path) -> pd.DataFrame:
     """Frame of the capsules and cylinders of an MJCF in its home pose: model, both ends and radius in mm, colour.
 
     Turned over where the file's z points down.

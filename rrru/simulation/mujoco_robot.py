@@ -1,19 +1,26 @@
 """A robot that MuJoCo simulates from its MJCF, with MuJoCo's own causes of errors: an independent second simulator."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import pandas as pd
 from scipy.spatial.transform import Rotation
 
+from rrru.campaign.plan import Plan
+from rrru.effects.protocol import Motion
 from rrru.errors import ConfigError
+from rrru.kinematics.arrays import FloatArray
 from rrru.kinematics.chain import Poses
 from rrru.kinematics.dynamics import Masses
 from rrru.kinematics.robot import Robot
 from rrru.simulation import mujoco_model
-from rrru.simulation.driven import SETTLE_S, DrivenRobot
+from rrru.simulation.driven import ONLY_TOOL, SETTLE_S, Controller, DrivenRobot
 from rrru.simulation.mujoco_causes import MOVING, apply
 from rrru.simulation.mujoco_run import Machine
+from rrru.simulation.tracker import Sees
 
 
 @dataclass(frozen=True)
@@ -27,12 +34,12 @@ class MujocoRobot(DrivenRobot):
     mechanism: Robot
     file: Path
     platform: str
-    causes: dict = field(default_factory=dict)
+    causes: dict[str, dict[str, float]] = field(default_factory=dict)
     non_repeatability_mm: float = 0.0
     masses: Masses = field(default_factory=lambda: Masses(0.0, 0.0, 0.0))
     rotation_limit_rad: float = 0.05
 
-    def machine(self, payload_kg=0.0):
+    def machine(self, payload_kg: float = 0.0) -> Machine:
         """The Machine of the file with its causes; payload_kg: the heaviest that it will carry.
 
         Raises ConfigError where a cause or a drive does not fit the file.
@@ -46,15 +53,23 @@ class MujocoRobot(DrivenRobot):
         return Machine(edit, self.file)
 
     @property
-    def moves(self):
+    def moves(self) -> bool:
         """Whether it is read on the way; else it rests at every point."""
         return not set(MOVING).isdisjoint(self.causes)
 
-    def run(self, plan, *how, **more):
+    def run(
+        self,
+        plan: Plan,
+        noise_mm: float,
+        generator: np.random.Generator,
+        controller: Controller | None = None,
+        sees: Sees = ONLY_TOOL,
+    ) -> tuple[pd.DataFrame, pd.DataFrame]:
         """Drive a plan, see DrivenRobot; a robot that rests at every point takes longer than the plan says."""
-        return super().run(plan if self.moves else plan.resting(SETTLE_S), *how, **more)
+        driven = plan if self.moves else plan.resting(SETTLE_S)
+        return super().run(driven, noise_mm, generator, controller, sees)
 
-    def posed(self, motion, target):
+    def posed(self, motion: Motion, target: FloatArray) -> tuple[Poses, FloatArray]:
         """Poses (n) along a Motion as simulated, with no twists; see Machine.drive for the errors raised."""
         payload = np.nan_to_num(motion.payload_kg)
         position, turn = self.machine(payload.max(initial=0.0)).drive(motion, self.moves)
@@ -64,7 +79,7 @@ class MujocoRobot(DrivenRobot):
         return poses, np.zeros((count, len(legs.sites), 6))
 
 
-def from_config(mechanism, dimensions, section):
+def from_config(mechanism: Robot, dimensions: Mapping[str, Any], section: Mapping[str, Any]) -> MujocoRobot:
     """The robot of a `virtual_robots:` entry with `mujoco`, of a mechanism that a `robots:` entry with `mjcf` made.
 
     Raises ConfigError where the entry has effects of this package's models, or the mechanism is from no MJCF.

@@ -5,13 +5,18 @@ their states. At each point the robot is at rest and its loops are closed, or an
 Geometric errors, constant and by warming up, move the seats of bodies and of sites.
 """
 
+from pathlib import Path
+from typing import Any
+
 import mujoco
 import numpy as np
 from scipy.interpolate import Akima1DInterpolator, CubicHermiteSpline
 from scipy.spatial.transform import Rotation
 
+from rrru.effects.protocol import Motion
 from rrru.errors import SimulationError, UnreachableError
-from rrru.simulation.mujoco_model import MM, PAYLOAD, STEP_S
+from rrru.kinematics.arrays import FloatArray
+from rrru.simulation.mujoco_model import MM, PAYLOAD, STEP_S, Edit
 
 # a recorded point's loops are open by less, and its platform is slower, angles counted at an arm of half a metre: a
 # body held by friction creeps in MuJoCo by some um/s
@@ -30,7 +35,7 @@ _BURST = (_WARNING.mjWARN_BADQPOS, _WARNING.mjWARN_BADQVEL, _WARNING.mjWARN_BADQ
 class Machine:
     """A compiled Edit at home; file: for messages."""
 
-    def __init__(self, edit, file):
+    def __init__(self, edit: Edit, file: Path) -> None:
         self.edit, self.file, self.model = edit, file, edit.spec.compile()
         self.data, model = self._at_home(), self.model
         for name, kilograms in edit.masses.items():
@@ -45,13 +50,13 @@ class Machine:
         # a servo sees the position at the beginning of a step and the control of its end
         self.known_lag_s = kv / kp - STEP_S - [edit.lags.get(joint, 0.0) for joint in edit.servos]
 
-    def _weigh(self, payload_kg):
+    def _weigh(self, payload_kg: float) -> None:
         """Hang a payload on the platform."""
         self.model.body(self.edit.prefix + PAYLOAD).mass = payload_kg
         mujoco.mj_setConst(self.model, mujoco.MjData(self.model))
         self._balance_leashes()
 
-    def _balance_leashes(self):
+    def _balance_leashes(self) -> None:
         """Set MuJoCo's inverse weight of each leash: at home a leash has no length and so no direction."""
         model, data = self.model, self._at_home()
         mujoco.mj_forward(model, data)
@@ -65,14 +70,14 @@ class Machine:
             tendon = model.tendon(self.edit.prefix + name).id
             model.tendon_invweight0[tendon] = np.linalg.eigvalsh(across @ moved.T)[-1]
 
-    def _at_home(self):
+    def _at_home(self) -> mujoco.MjData:
         """New data in the home pose."""
         data = mujoco.MjData(self.model)
         for joint, values in self.edit.home.items():
             data.joint(self.edit.prefix + joint).qpos = values
         return data
 
-    def _damp_added(self):
+    def _damp_added(self) -> None:
         """Critical damping of the joints that causes have added, so that they come to rest."""
         model = self.model
         for name, frequency in self.edit.damped.items():
@@ -84,7 +89,7 @@ class Machine:
             mass = 1.0 / model.tendon_invweight0[model.tendon(self.edit.prefix + leash).id]
             model.actuator(self.edit.prefix + name).biasprm[2] = -2.0 * mass * frequency
 
-    def controls(self, drives):
+    def controls(self, drives: FloatArray) -> FloatArray:
         """Controls (N, K) for actuator values (N, K) in rad or mm; raises UnreachableError beyond the file's ranges."""
         edit, model = self.edit, self.model
         unit = np.array([edit.lengths[joint] for joint in edit.servos])
@@ -101,7 +106,7 @@ class Machine:
                 raise UnreachableError(f"{self.file}: {text}; allowed: {low:g} to {high:g} (m, rad)")
         return result + [edit.offsets.get(joint, 0.0) for joint in edit.servos]
 
-    def drive(self, motion, moving):
+    def drive(self, motion: Motion, moving: bool) -> tuple[FloatArray, FloatArray]:
         """Poses along a Motion: positions (n, 3) in mm and turns (n, 3, 3) of the platform at its points.
 
         moving: whether points are read on the way, at their times, where the drives move there; else all at rest.
@@ -118,9 +123,8 @@ class Machine:
                 if payload[point] != payload[point - 1]:
                     self._weigh(payload[point])
                 self.shape.write(1.0, time_s[point])
-                self._send(
-                    way.in_time(point) if on_time else way.at_ease(*index[point - 1 : point + 1], way.far[point])
-                )
+                before, here = index[point - 1 : point + 1]
+                self._send(way.in_time(point) if on_time else way.at_ease(before, here, way.far[point]))
             where = f"point {point + 1} of {len(index)}"
             if not on_time or not way.moving[point]:
                 self._rest(where)
@@ -130,7 +134,7 @@ class Machine:
             turns.append(self.data.xmat[self.platform].reshape(3, 3).copy())
         return np.array(positions), np.array(turns)
 
-    def _assemble(self, controls, payload_kg):
+    def _assemble(self, controls: FloatArray, payload_kg: float) -> None:
         """Bring the robot from home to its first controls, with weight and errors growing from zero."""
         self._weigh(payload_kg)
         home = np.concatenate([self.edit.home[joint] for joint in self.edit.servos])
@@ -140,14 +144,14 @@ class Machine:
             self.shape.write(share, 0.0)
             self._send((home + share * (controls - home))[None])
 
-    def _send(self, controls):
+    def _send(self, controls: FloatArray) -> None:
         """One step for every row of controls (m, K)."""
         model, data = self.model, self.data
         for row in controls:
             data.ctrl[self.actuators] = row
             mujoco.mj_step(model, data)
 
-    def _rest(self, where):
+    def _rest(self, where: str) -> None:
         """Wait until the platform is at rest twice in a row."""
         calm = 0
         for block in range(_MOST_BLOCKS):
@@ -162,7 +166,7 @@ class Machine:
         waited = f"still moves at {speed:.3g} mm/s after {STEP_S * _MOST_BLOCKS * np.mean(_BLOCKS):.1f} s"
         raise SimulationError(f"{self.file}: {where} {waited}; allowed: less than {REST_MM_S:g}")
 
-    def _closed(self, where):
+    def _closed(self, where: str) -> None:
         """Raise SimulationError where loops are open."""
         self._unburst(where)
         data = self.data
@@ -170,7 +174,7 @@ class Machine:
         if not open_mm < CLOSED_MM:
             raise SimulationError(f"{self.file}: {where}: loops are open by {open_mm:.3g} mm; allowed: {CLOSED_MM:g}")
 
-    def _unburst(self, where):
+    def _unburst(self, where: str) -> None:
         """Raise SimulationError where the simulation has become unstable, after which MuJoCo resets it."""
         if any(self.data.warning[int(kind)].number for kind in _BURST):
             raise SimulationError(f"{self.file}: {where}: the simulation has become unstable; allowed: softer causes")
@@ -179,7 +183,7 @@ class Machine:
 class _Way:
     """Controls along a path (N, K) with points at rows (n,), those of a Motion."""
 
-    def __init__(self, path, motion, known_lag_s):
+    def __init__(self, path: FloatArray, motion: Motion, known_lag_s: FloatArray) -> None:
         self.path, self.index, self.time_s, self.lag_s = path, motion.path_index, motion.time_s, known_lag_s
         rate, spots = np.nan_to_num(motion.drive_rate), motion.position_mm / MM
         self.moving = np.abs(rate).max(axis=1) > 0.0
@@ -188,11 +192,11 @@ class _Way:
         self.speed = (rate * slope).sum(axis=1) / np.maximum((slope**2).sum(axis=1), 1e-30)
         self.far = np.linalg.norm(np.diff(spots, axis=0, prepend=spots[:1]), axis=1)
 
-    def moves(self, point):
+    def moves(self, point: int) -> bool:
         """Whether the drives move at a point or the one before."""
-        return self.moving[point - 1] or self.moving[point]
+        return bool(self.moving[point - 1] or self.moving[point])
 
-    def at_ease(self, first, last, far=0.0):
+    def at_ease(self, first: int, last: int, far: float = 0.0) -> FloatArray:
         """Controls (m, K) from row to row of the path, at least so far in m, with a smooth start and end."""
         rows = np.arange(len(self.path))
         turned = np.abs(np.diff(self.path[first : last + 1], axis=0)).max(axis=1, initial=0.0).sum()
@@ -200,7 +204,7 @@ class _Way:
         at = first + (last - first) * _smooth(round(max(seconds, _SHORTEST_S) / STEP_S))
         return np.stack([np.interp(at, rows, drive) for drive in self.path.T], axis=1)
 
-    def in_time(self, point):
+    def in_time(self, point: int) -> FloatArray:
         """Controls (m, K) from the point before to a point as the plan's times say, with the drives' feedforward."""
         before, rests = slice(point - 1, point + 1), np.flatnonzero(~self.moving)
         first, last = rests[rests < point].max(initial=0), rests[rests >= point].min(initial=len(self.moving) - 1)
@@ -208,11 +212,12 @@ class _Way:
         along = Akima1DInterpolator(rows, self.path[rows], method="makima")
         at = CubicHermiteSpline(self.time_s[before], self.index[before], self.speed[before])
         count = max(round(np.diff(self.time_s[before])[0] / STEP_S), 1)
-        controls = along(np.clip(at(np.linspace(*self.time_s[before], count + 1)), rows[0], rows[-1]))
-        return controls[1:] + self.lag_s * np.diff(controls, axis=0) / STEP_S
+        start_s, end_s = self.time_s[before]
+        controls = along(np.clip(at(np.linspace(start_s, end_s, count + 1)), rows[0], rows[-1]))
+        return np.asarray(controls[1:] + self.lag_s * np.diff(controls, axis=0) / STEP_S)
 
 
-def _smooth(steps):
+def _smooth(steps: int) -> FloatArray:
     """Shares (steps,) from above 0 to 1 that start and end smoothly."""
     s = np.linspace(0.0, 1.0, steps + 1)[1:]
     return s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
@@ -221,14 +226,14 @@ def _smooth(steps):
 class Shape:
     """Writes an Edit's shifts into its compiled model."""
 
-    def __init__(self, edit, model):
+    def __init__(self, edit: Edit, model: mujoco.MjModel) -> None:
         self.edit, self.model = edit, model
         self.nominal = {
             "body": (model.body_pos.copy(), model.body_quat.copy()),
             "site": (model.site_pos.copy(), model.site_quat.copy()),
         }
 
-    def write(self, share, seconds):
+    def write(self, share: float, seconds: float) -> None:
         """Write a share of the shifts, and the growth after a time."""
         model, warm = self.model, -np.expm1(-seconds / (self.edit.warming_s or np.inf))
         for array, nominal in zip((model.body_pos, model.body_quat), self.nominal["body"], strict=True):
@@ -243,7 +248,7 @@ class Shape:
             body = model.body(at.bodyid[0])
             model.site(self.edit.prefix + seat).pos = body.pos + _turn(body.quat).apply(at.pos)
 
-    def _move(self, element, direction, size):
+    def _move(self, element: Any, direction: int, size: float) -> None:
         """Shift a body's or site's seat, or turn it, in the frame of what carries it."""
         axis = np.eye(3)[direction % 3]
         if direction < 3:
@@ -253,6 +258,6 @@ class Shape:
             element.quat = turned.as_quat(scalar_first=True)
 
 
-def _turn(quat):
+def _turn(quat: FloatArray) -> Rotation:
     """Rotation of MuJoCo's quaternion."""
     return Rotation.from_quat(quat, scalar_first=True)

@@ -1,5 +1,6 @@
 """Bench of a screw: one slider driven forwards, back and forwards, with an encoder at it (paper B, Fig. 7). mm."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,6 +9,8 @@ import pandas as pd
 from rrru.effects.motion import Course, make_motion
 from rrru.effects.protocol import together
 from rrru.errors import UnreachableError
+from rrru.kinematics.arrays import FloatArray, IntArray
+from rrru.simulation.virtual_robot import VirtualRobot
 
 PASSES = ("forward_1", "reverse", "forward_2")
 
@@ -22,7 +25,7 @@ class ScrewBench:
     noise_mm: float
     resolution_mm: float
 
-    def path(self):
+    def path(self) -> tuple[FloatArray, IntArray]:
         """Commanded travel (3 n + 1,) in mm from the start, and each sample's pass (3 n + 1,), 0 to 2.
 
         All passes stop at the same places, so that readings can be compared one by one; the turning points belong to
@@ -34,7 +37,14 @@ class ScrewBench:
         return travel, np.concatenate([[0], np.repeat([0, 1, 2], count)])
 
 
-def encoder_record(robot, leg, payload_kg, bench, place_mm, generator):
+def encoder_record(
+    robot: VirtualRobot,
+    leg: int,
+    payload_kg: float,
+    bench: ScrewBench,
+    place_mm: Sequence[float],
+    generator: np.random.Generator,
+) -> pd.DataFrame:
     """Record of one slider, leg 1 to 3: pass, commanded_mm and encoder_mm per sample, under a payload.
 
     The robot is near `place_mm` (3,), the other two sliders do not move. The encoder reads the carriage with all errors

@@ -1,15 +1,19 @@
 """The instrument: a laser tracker that sees the tool or reflectors on it, and if asked the platform's orientation."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
 from rrru.campaign import measurements as rows
+from rrru.kinematics.arrays import FloatArray, IntArray
+from rrru.kinematics.chain import Poses
 from rrru.kinematics.legs import TOOL
 from rrru.kinematics.readings import orientation, turned_by
-from rrru.kinematics.robot import into_frame
+from rrru.kinematics.robot import Robot, into_frame
 
 
 @dataclass(frozen=True)
@@ -20,19 +24,19 @@ class Sees:
     the tool; noise_rad: noise of the orientations that it reads, one sigma per axis, None where it reads none.
     """
 
-    targets: Mapping = field(default_factory=dict)
+    targets: Mapping[str, Sequence[float]] = field(default_factory=dict)
     noise_rad: float | None = None
 
     @property
-    def only_tool(self):
+    def only_tool(self) -> bool:
         """Whether it reads only the tool's position."""
         return not self.targets and self.noise_rad is None
 
-    def rows(self, count):
+    def rows(self, count: int) -> IntArray:
         """The commanded point (m,) of each row of a table of `count` points."""
         return np.repeat(np.arange(count), max(len(self.targets), 1))
 
-    def positions(self, robot, poses, twists):
+    def positions(self, robot: Robot, poses: Poses, twists: FloatArray) -> FloatArray:
         """True positions (m, 3) of what it sees of a robot at n Poses under twists (n or 1, sites, 6)."""
         if not self.targets:
             return robot.measured(poses, twists)
@@ -42,7 +46,9 @@ class Sees:
         seen = [poses.point(seat + turned_by(tool[:, 3:], lever) + tool[:, :3]) for lever in levers]
         return np.stack([into_frame(place, twists[:, 0]) for place in seen], axis=1).reshape(-1, 3)
 
-    def columns(self, robot, poses, twists, generator):
+    def columns(
+        self, robot: Robot, poses: Poses, twists: FloatArray, generator: np.random.Generator
+    ) -> dict[str, npt.NDArray[Any]]:
         """Columns (m,) besides the positions: target, its place, orientations measured with noise."""
         count = len(poses.position_mm)
         result = {}
@@ -56,6 +62,6 @@ class Sees:
         return result
 
 
-def measure(position_mm, noise_mm, generator):
+def measure(position_mm: FloatArray, noise_mm: float, generator: np.random.Generator) -> FloatArray:
     """Positions (n, 3) with independent normal noise of `noise_mm` (1 sigma per axis, mm) from a numpy Generator."""
     return np.asarray(position_mm, dtype=float) + noise_mm * generator.standard_normal(np.shape(position_mm))

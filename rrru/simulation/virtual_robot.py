@@ -1,18 +1,23 @@
 """The virtual robot: a nominal controller, and a plant of exact loop closure with effects."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
+from rrru.campaign.plan import Plan
 from rrru.effects.library import active_effects
 from rrru.effects.motion import make_motion, standing
-from rrru.effects.protocol import bears_load, together
+from rrru.effects.protocol import ActiveEffect, Motion, bears_load, together
 from rrru.errors import ConfigError
+from rrru.kinematics.arrays import FloatArray
+from rrru.kinematics.chain import Poses
 from rrru.kinematics.dynamics import Masses
 from rrru.kinematics.robot import Robot
 from rrru.robots.rrru3 import Rrru3
-from rrru.simulation.driven import DrivenRobot
+from rrru.simulation.driven import Controller, DrivenRobot
 
 # fixed-point iterations between loads and the deflected pose: enough for a deflection of a millimetre
 _DEFLECTION_ITERATIONS = 3
@@ -29,19 +34,19 @@ class VirtualRobot(DrivenRobot):
     """
 
     mechanism: Robot = field(default_factory=Rrru3)
-    deviations: dict = field(default_factory=dict)
-    axis_deviations: np.ndarray | float = 0.0
-    effects: tuple = ()
+    deviations: dict[str, float] = field(default_factory=dict)
+    axis_deviations: FloatArray | float = 0.0
+    effects: tuple[ActiveEffect, ...] = ()
     non_repeatability_mm: float = 0.0
     masses: Masses = field(default_factory=Masses)
     rotation_limit_rad: float = 0.05
 
     @cached_property
-    def twists(self):
+    def twists(self) -> FloatArray:
         """Twists (1, sites, 6) of its deviations and axes."""
         return self.mechanism.twists_of(self.deviations) + self.axis_deviations
 
-    def motion(self, plan, controller):
+    def motion(self, plan: Plan, controller: Controller) -> Motion:
         """The Motion of a plan, input of the effects; the loads are those at the true pose, with errors and deflection.
 
         For a platform that cannot turn they are those at the commanded positions: there a millimetre changes them by a
@@ -55,13 +60,13 @@ class VirtualRobot(DrivenRobot):
                 motion = make_motion(self.mechanism, self.masses, course, at)
         return motion
 
-    def posed(self, motion, target):
+    def posed(self, motion: Motion, target: FloatArray) -> tuple[Poses, FloatArray]:
         """Poses (n) near targets (n, 3), and twists (n, sites, 6) of all errors."""
         twists, near = self.twists + together(self.effects, motion).twists, self.mechanism.near(target, motion.drive)
         return self.mechanism.model.solve(motion.drive, near, twists), twists
 
 
-def from_config(mechanism, section):
+def from_config(mechanism: Robot, section: Mapping[str, Any]) -> VirtualRobot:
     """The virtual robot of one `virtual_robots:` entry; raises ConfigError naming the key."""
     known = mechanism.deviation_names
     for name in section["errors"]:
@@ -78,7 +83,7 @@ def from_config(mechanism, section):
     )
 
 
-def _axis_deviations(mechanism, section):
+def _axis_deviations(mechanism: Robot, section: Mapping[str, Any]) -> FloatArray:
     """Displacements (sites, 6): normal draws of the stated sizes from the stated seed at the seats of all axes."""
     numbers = mechanism.legs.site_numbers
     result = np.zeros((len(numbers), 6))

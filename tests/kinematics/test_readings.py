@@ -192,3 +192,19 @@ def test_a_robot_as_read_knows_the_deviations_of_its_robot_and_its_own():
         plain = robot.twists_of({deviation: 1e-3})
         expected = robot.measured(robot.solve(actuators, points, plain), plain) + np.array([0.3, 0.0, 0.0])
         np.testing.assert_allclose(read.measured(poses, twists), expected, atol=1e-9)
+
+
+def test_orientations_alone_do_not_depend_on_the_places_of_reflectors():
+    """Of a robot with reflectors only the tool and the orientation are read: a reflector's twist changes nothing."""
+    robot, points, actuators = _poses("hexapod")
+    poses = robot.solve(actuators, points)
+    at = robot.map(actuators, poses, readings=Readings(points, turn=poses.turn, arm_mm=_ARM_MM))
+    assert not at.effect("ball a").any()
+
+
+def test_places_without_reflectors_are_refused():
+    points = np.zeros((3, 3))
+    with pytest.raises(ValueError, match="places without reflectors"):
+        Readings(points, place_mm=points)
+    with pytest.raises(ValueError, match="reflectors without places"):
+        Readings(points, np.array(["ball a"] * 3))

@@ -11,7 +11,7 @@ instrument whose frame is registered to the robot alone does not determine B; re
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import ClassVar
+from typing import ClassVar, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -22,6 +22,7 @@ from rrru.errors import FitError
 from rrru.estimation.parameters import Block
 from rrru.kinematics.chain import Poses
 from rrru.kinematics.legs import WORLD
+from rrru.kinematics.measurement_jacobian import ReadingMap
 from rrru.kinematics.readings import Readings, orientation
 from rrru.kinematics.robot import Robot
 
@@ -121,7 +122,9 @@ class Inclinations:
         up, by_tilt = self._up_in_base(values[-2:])
         poses, twists = self._poses(values[:-2])
         readings = Readings(self.start_mm, turn=np.tile(np.eye(3), (len(self), 1, 1)), arm_mm=1.0)
-        turned = self.mechanism.map(self.actuators, poses, twists, readings).turn_columns(self._directions)
+        # readings of orientations have this kind of map
+        at = cast(ReadingMap, self.mechanism.map(self.actuators, poses, twists, readings))
+        turned = at.turn_columns(self._directions)
         # a platform that turns by w sees the direction u turn by -w
         by_turn = np.cross(up, turned.transpose(0, 2, 1)).transpose(0, 2, 1)
         moved = np.concatenate([by_turn, np.tile(by_tilt, (len(self), 1, 1))], axis=2)
