@@ -14,10 +14,10 @@ _PAPER_A = "rrru.studies.rrru3.figures"
 PAPER_A_FIGURES = {
     "fig06": (f"{_PAPER_A}.sweep:fig06", _SWEEP_SHOWN),
     "fig07": (f"{_PAPER_A}.sweep:fig07", _SWEEP_SHOWN),
-    "fig09": (f"{_PAPER_A}.lines:fig09", ["measurements", "errors", "redraw_errors"]),
-    "fig10": (f"{_PAPER_A}.lines:fig10", ["measurements", "errors", "redraw_errors"]),
-    "fig11": (f"{_PAPER_A}.spiral:fig11", ["measurements", "errors", "redraw_errors"]),
-    "fig12": (f"{_PAPER_A}.lines:fig12", ["measurements", "errors", "redraw_errors"]),
+    "fig09": (f"{_PAPER_A}.trajectories:fig09", ["measurements", "errors", "redraw_errors"]),
+    "fig10": (f"{_PAPER_A}.trajectories:fig10", ["measurements", "errors", "redraw_errors"]),
+    "fig11": (f"{_PAPER_A}.trajectories:fig11", ["measurements", "errors", "redraw_errors"]),
+    "fig12": (f"{_PAPER_A}.trajectories:fig12", ["measurements", "errors", "redraw_errors"]),
 }
 TWIN_FIGURES = {"twin_search": (f"{_PAPER_A}.twin:twin_search", ["twin_progress", "twin_restarts"])}
 TRADEOFF_FIGURES = {"twin_tradeoff": (f"{_PAPER_A}.twin:twin_tradeoff", ["twin_tradeoff"])}
