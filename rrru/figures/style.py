@@ -17,7 +17,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.backends.backend_pdf import FigureCanvasPdf
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, NullFormatter
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from rrru.store.atomic_write import whole
 
@@ -188,6 +188,12 @@ def plain_log(axis):
     """Ticks of a log axis as plain numbers at the decades: the digits of powers would be too small to read."""
     axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axis.set_minor_formatter(NullFormatter())
+
+
+def short_log(axis):
+    """Ticks of a short log axis at 1 and 3 of every decade, as plain numbers."""
+    axis.set_major_locator(LogLocator(subs=(1.0, 3.0)))
+    plain_log(axis)
 
 
 def save(figure, paths, caption=""):

@@ -8,6 +8,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 # import statements of the package's own modules, inside of functions too
 _FROM = re.compile(r"^[ \t]*from[ \t]+(rrru[\w.]*)[ \t]+import[ \t]+(\([^)]*\)|[^\n]*)", re.MULTILINE)
+_DATA = re.compile(r"""Path\(__file__\)\.with_name\("([^"]+\.csv)"\)""")
 _IMPORT = re.compile(r"^[ \t]*import[ \t]+(rrru[\w.]*)", re.MULTILINE)
 
 
@@ -64,11 +65,12 @@ def _imported(file: Path) -> tuple[Path, ...]:
 
 
 def _looked_for(file: Path, text: str) -> list[Path]:
-    """Files that a file imports without naming them: of its folder, or every package with its schemas."""
+    """Files that a file uses without importing them by name: data, of its folder, or every package with its schemas."""
     if "pkgutil.walk_packages(" in text:
         package = ROOT / file.relative_to(ROOT).parts[0]
         return [*package.rglob("__init__.py"), *package.rglob("schemas.py")]
-    return list(file.parent.glob("*.py")) if "pkgutil.iter_modules(" in text else []
+    data = [file.with_name(name) for name in _DATA.findall(text)]
+    return data + (list(file.parent.glob("*.py")) if "pkgutil.iter_modules(" in text else [])
 
 
 @cache

@@ -7,7 +7,9 @@ from typing import Any
 
 _KINDS = {"int": "int64", "float": "float64", "str": "str", "bool": "bool"}
 # name, kind, description, {allowed values}
-_ROW = re.compile(r"(\S+) +(int|float|str|bool)(\??) +(.*?)(?: +\{([^}]*)\})?$")
+_ROW = re.compile(r"(\S+) +(int|float|str|bool)(\??) +(.*?)(?: +\{([^}]*,[^}]*)\})?$")
+# characters of which each makes a column
+_EACH = re.compile(r"\{(\w+)\}")
 
 
 @dataclass(frozen=True)
@@ -53,8 +55,9 @@ def read_tables(text: str) -> tuple[Table, ...]:
 
     A block that begins with "## name | path | key" is a table: lines that describe it, "--", then its columns. A column
     is "name kind description {allowed, values}", continued on indented lines, its kind int, float, str or bool, with ?
-    where it may be null; {xyz} in its name makes one for each axis. A block without a heading has columns that tables
-    share: in a table a line of their names represents them.
+    where it may be null; {xyz} in its name makes one for each axis, {123} one for each number, which {123} in the
+    description is too. A block without a heading has columns that tables share: in a table a line of their names
+    represents them.
     """
     shared: dict[str, tuple[Column, ...]] = {}
     tables = []
@@ -80,11 +83,15 @@ def _columns(text: str, shared: dict[str, tuple[Column, ...]]) -> Iterator[Colum
         name, kind, null, description, allowed = row.groups()
         values = tuple(value.strip() for value in allowed.split(",")) if allowed else ()
         column = Column(name, _KINDS[kind], description, bool(null), values)
-        if "{xyz}" not in name:
+        each = _EACH.search(name)
+        if not each:
             yield column
             continue
-        for axis in "xyz":
-            yield replace(column, name=name.replace("{xyz}", axis), description=f"{description}, {axis}")
+        suffix = ", {xyz}" if each[1] == "xyz" else ""
+        for one in each[1]:
+            yield replace(
+                column, name=name.replace(each[0], one), description=(description + suffix).replace(each[0], one)
+            )
 
 
 def _lines(text: str) -> list[str]:

@@ -1,7 +1,9 @@
 """Printed contents of a paper: its numbers compared with a study's, and its misprints as rows of an audit."""
 
+import csv
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -22,9 +24,24 @@ class Number:
     note: str = ""
 
 
-def numbers(source, unit, note="", **values):
-    """Numbers that are printed in one place, in one unit: items to values."""
-    return tuple(Number(item, source, unit, value, note) for item, value in values.items())
+def read_numbers(file):
+    """Numbers of a CSV file by the column part, each a tuple in the file's order."""
+    parts = {}
+    for row in _rows(file):
+        number = Number(row["item"], row["source"], row["unit"], float(row["value"]), row["note"])
+        parts.setdefault(row["part"], []).append(number)
+    return {part: tuple(numbers) for part, numbers in parts.items()}
+
+
+def read_lost(file):
+    """Lost parts of a scan from a CSV file: {where: (what, instead)}."""
+    return {row["where"]: (row["what"], row["instead"]) for row in _rows(file)}
+
+
+def _rows(file):
+    """Rows of a CSV file as mappings of text."""
+    with Path(file).open(encoding="utf-8", newline="") as lines:
+        return list(csv.DictReader(lines))
 
 
 @dataclass(frozen=True)

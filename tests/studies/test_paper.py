@@ -11,7 +11,8 @@ from rrru.studies.rrru3 import audit as audit_a
 from tests.schemas import check
 
 NUMBERS = (
-    *paper.numbers("Table 1", "mm", "chosen", length=4.0, width=0.0),
+    paper.Number("length", "Table 1", "mm", 4.0, "chosen"),
+    paper.Number("width", "Table 1", "mm", 0.0, "chosen"),
     paper.Number("length", "abstract", "mm", 5.0),
     paper.Number("angle", "Fig. 2", "deg", 30.0),
 )

@@ -13,9 +13,8 @@ def main(settings, inputs, outputs):
     """Write calibrations, observability, errors on the plane, those of other draws and robots, and the camera."""
     centres, truth = tables.read(inputs["delta_centres"]), tables.read(inputs["delta_truth"])
     robot, section = twin(settings), settings["delta"]
-    others = fits.Spread(**section["spread"])
     noise = draws.centre_noise_px(settings, truth, tables.read(inputs["delta_dots"]))
-    errors = draws.drawn_errors(settings, truth, noise, others.draws, "draws")
+    errors = draws.drawn_errors(settings, truth, noise, section["spread"]["draws"], "draws")
     calibrations, observability, points = fits.study(robot, Seen.of_tables(centres, truth), section["length_error_mm"])
     frames = {
         "delta_camera": tables.read(inputs["delta_lens"]).assign(true=views.true_camera(settings)),
@@ -23,7 +22,7 @@ def main(settings, inputs, outputs):
         "delta_observability": observability,
         "delta_points": points,
         "delta_draws": fits.other_draws(robot, truth, errors),
-        "delta_robots": fits.other_robots(robot, truth, errors, others),
+        "delta_robots": fits.other_robots(robot, truth, errors, section["spread"]),
         "delta_poses": pose_errors(centres, truth),
     }
     tables.write_all(TABLES, frames, outputs)

@@ -3,7 +3,7 @@
 from rrru.pipeline import setup
 from rrru.store import tables
 from rrru.store.job import run
-from rrru.studies.rrru3 import twin, twin_search, twin_tradeoff
+from rrru.studies.rrru3 import twin, twin_comparisons, twin_search
 from rrru.studies.rrru3.schemas import TABLES
 
 
@@ -15,7 +15,7 @@ def main(settings, inputs, outputs):
     task = twin_search.make_task(campaign, virtual, section["draws"], calibration, tuple(section["more"]))
     fresh = twin_search.redrawn(campaign, section["hypotheses"]["draws"])
     start = twin.from_config(virtual)
-    frame = twin_tradeoff.tradeoff(task, fresh, section, start, settings["workers"], settings["state"])
+    frame = twin_comparisons.tradeoff(task, fresh, section, start, settings["workers"], settings["state"])
     tables.write_all(TABLES, {"twin_tradeoff": frame}, outputs)
 
 

@@ -90,13 +90,15 @@ def draw(member, conditions):
     """The 3-RRRU of a Member of the check, see `rrru.studies.blind_validation.chunks`."""
     kinds = {"effect": _draw_single, "noise": _draw_noisy, "many": _draw_many, "background": _draw_background}
     kinds[AS_ROBOTS_ARE] = _draw_as_robots_are
-    return kinds.get(member.check, _draw_labelled)(member, conditions)
-
-
-def _draw_labelled(member, conditions):
-    """A robot with nothing, one effect, two, or a cause from outside."""
-    generator = stream(conditions.seed, "withheld", member.number)
+    labels = {"effect": (member.about,), "noise": (member.check, member.about)}.get(member.check, (member.check,))
+    labels = labels if member.check in kinds else ()
+    generator = stream(conditions.seed, "withheld", *labels, member.number)
     robot = bare(member.name, generator, conditions)
+    return kinds.get(member.check, _draw_labelled)(member, robot, generator, conditions)
+
+
+def _draw_labelled(_member, robot, generator, conditions):
+    """A robot with nothing, one effect, two, or a cause from outside."""
     truth = generator.choice(list(TRUTHS), p=list(TRUTHS.values()))
     if truth == "none":
         return robot
@@ -116,27 +118,28 @@ def _with_causes(robot, names, span, generator, conditions):
     raise UnreachableError(f"{robot.name}: {' and '.join(names)} lose a pose in {DRAWS} draws")
 
 
-def _draw_single(member, conditions):
+def _draw_single(member, robot, generator, conditions):
     """A robot with a single effect, strong enough to be detected."""
-    generator = stream(conditions.seed, "withheld", member.about, member.number)
-    robot = bare(member.name, generator, conditions)
     acting = draw_acting(robot, member.about, True, (CLEAR, STRONGEST), generator, conditions)
     return replace(robot, acting=(acting,))
 
 
-def _draw_noisy(member, conditions):
+def _draw_noisy(member, robot, generator, conditions):
     """A robot with noise that is not as stated, every second one with one effect."""
-    generator = stream(conditions.seed, "withheld", member.check, member.about, member.number)
-    robot = replace(bare(member.name, generator, conditions), noise=_changed(NOISES[member.about]))
+    robot = replace(robot, noise=_changed(NOISES[member.about]))
+    return _add_effect_if_odd(member, robot, generator, conditions)
+
+
+def _add_effect_if_odd(member, robot, generator, conditions):
+    """The robot with one effect where its number is odd."""
     if member.number % 2 == 0:
         return robot
     return _with_causes(robot, [str(generator.choice(list(EFFECTS)))], (SEEN, STRONGEST), generator, conditions)
 
 
-def _draw_many(member, conditions):
+def _draw_many(member, robot, generator, conditions):
     """A robot with axis errors, scatter and three to six effects; half of them also have a cause from outside."""
-    generator = stream(conditions.seed, "withheld", member.check, member.number)
-    robot = with_background(bare(member.name, generator, conditions), generator, conditions)
+    robot = with_background(robot, generator, conditions)
     names = generator.choice(list(EFFECTS), int(generator.integers(3, 7)), replace=False).tolist()
     if member.number % 2:
         names.append(str(generator.choice(list(OUTSIDE))))
@@ -144,22 +147,18 @@ def _draw_many(member, conditions):
     return _with_causes(replace(robot, noise=noise), names, MANY, generator, conditions)
 
 
-def _draw_background(member, conditions):
+def _draw_background(member, robot, generator, conditions):
     """A robot with axis errors, every second one with one effect as well."""
-    generator = stream(conditions.seed, "withheld", member.check, member.number)
-    robot = with_background(bare(member.name, generator, conditions), generator, conditions)
-    if member.number % 2 == 0:
-        return robot
-    return _with_causes(robot, [str(generator.choice(list(EFFECTS)))], (SEEN, STRONGEST), generator, conditions)
+    robot = with_background(robot, generator, conditions)
+    return _add_effect_if_odd(member, robot, generator, conditions)
 
 
-def _draw_as_robots_are(member, conditions):
+def _draw_as_robots_are(member, robot, generator, conditions):
     """A robot with axis errors, scatter, noise that is not as stated and one to six effects.
 
     Every third one also has a cause from outside the library.
     """
-    generator = stream(conditions.seed, "withheld", member.check, member.number)
-    robot = with_background(bare(member.name, generator, conditions), generator, conditions)
+    robot = with_background(robot, generator, conditions)
     robot = replace(robot, noise=noise_not_as_stated(generator))
     names = generator.choice(list(EFFECTS), count_of_causes(generator), replace=False).tolist()
     if has_outside(member.number):

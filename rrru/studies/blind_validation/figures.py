@@ -3,7 +3,7 @@
 import numpy as np
 from matplotlib.colors import PowerNorm
 from matplotlib.patches import Rectangle
-from matplotlib.ticker import LogLocator, MultipleLocator
+from matplotlib.ticker import MultipleLocator
 
 from rrru.errors import ConfigError
 from rrru.figures import style
@@ -194,14 +194,12 @@ def _strength(axes, scores, checks):
         _shares(axes, scores[scores["check"] == name], ("strength", "right"), _STRENGTH_EDGES, *_CHECKS[name])
     if checks[0] != "field":
         # the true effect model of a field campaign is not known
-        rows, label = (
-            scores[scores["check"] == checks[0]],
-            f"detected with the true effect model, {_CHECKS[checks[0]][0]}",
+        label = f"detected with the true effect model, {_CHECKS[checks[0]][0]}"
+        _shares(
+            axes, scores[scores["check"] == checks[0]], ("strength", "oracle_detects"), _STRENGTH_EDGES, label, _ORACLE
         )
-        _shares(axes, rows, ("strength", "oracle_detects"), _STRENGTH_EDGES, label, _ORACLE)
     axes.set(xscale="log", xlabel="gap over noise, rms", ylabel="share of robots", ylim=(-0.03, 1.03))
-    axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 3.0)))
-    style.plain_log(axes.xaxis)
+    style.short_log(axes.xaxis)
     axes.set_title("correct verdicts, by strength of the gap")
 
 
@@ -235,8 +233,7 @@ def _parts(axes, parts):
         axes.plot(edges, factor * edges, **(_EVEN | {"linestyle": (0, (1, 2))}))
     axes.set(xscale="log", yscale="log", xlim=edges, ylim=edges, xlabel="true part (mm)", ylabel="found part (mm)")
     for axis in (axes.xaxis, axes.yaxis):
-        axis.set_major_locator(LogLocator(subs=(1.0, 3.0)))
-        style.plain_log(axis)
+        style.short_log(axis)
     axes.grid(True)
 
 

@@ -40,6 +40,7 @@ _WITHIN = f"found within {100 * _NEAR_PART:g} %"
 _PREDICTED = f"share closed predicted within {_NEAR:g}"
 _SEEN = 1.5
 _STRONG = f"acts == 'one' and strength >= {_SEEN}"
+_NOT_STRONG = "acts == 'one' and strength < 1.5"
 _WEAK = "acts == 'one' and 0.3 <= strength <= 1.0"
 _WEAK_GROUP = "one effect, gap 0.3 to 1 x noise"
 _ALL_ACTS = ("none", "one", "two", "outside")
@@ -112,14 +113,8 @@ _FILE = (
     ("outside the library, gap >= 2 x noise", "unexplained", _OUTSIDE, "right", None),
     ("outside the library, gap >= 2 x noise", f"unexplained, or its part {_WITHIN}", _OUTSIDE, "sized", 0.9),
     ("one place at fault, gap >= 1.5 x noise", "place named", f"{_STRONG} and truth_leg > 0", "leg_right", None),
-    ("one cause, gap below 1.5 x noise", "named exactly", "acts == 'one' and strength < 1.5", "right", None),
-    (
-        "one cause, gap below 1.5 x noise",
-        "oracle detects it",
-        "acts == 'one' and strength < 1.5",
-        "oracle_detects",
-        None,
-    ),
+    ("one cause, gap below 1.5 x noise", "named exactly", _NOT_STRONG, "right", None),
+    ("one cause, gap below 1.5 x noise", "oracle detects it", _NOT_STRONG, "oracle_detects", None),
     _CALIBRATED,
     ("one cause named, gap >= 1.5 x noise", _PREDICTED, f"{_STRONG} and right", "predicted", 0.9),
     _HELD,
@@ -279,15 +274,10 @@ def _each(check, robots):
             yield file or "3-RRRU", _MANY[0][1], f"file == '{file}'", "right", None
     if check in PLANTS:
         for cause, with_cause in robots.groupby("cause"):
-            yield cause, "right", f"cause == '{cause}'", "right", None
+            which = f"cause == '{cause}'"
+            yield cause, "right", which, "right", None
             if (with_cause["strength"] >= _SEEN).any():
-                yield (
-                    f"{cause}, gap >= 1.5 x noise",
-                    "right",
-                    f"cause == '{cause}' and strength >= {_SEEN}",
-                    "right",
-                    None,
-                )
+                yield f"{cause}, gap >= 1.5 x noise", "right", f"{which} and strength >= {_SEEN}", "right", None
         for file in sorted(robots["file"].unique()):
             yield file, "right", f"file == '{file}'", "right", None
     if check == "label":

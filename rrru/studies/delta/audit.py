@@ -4,6 +4,7 @@ The paper gives no dimensions: Delta's nominal ones are used instead.
 """
 
 from itertools import combinations
+from pathlib import Path
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -18,20 +19,7 @@ _PRINTED = {number.item: number.value for number in RESULTS}
 _CONCLUSION = ("conclusion (1)", "x, y errors of the platform along one plane identify the zero errors")
 # ASSUME the size of the part of the plane that the poses and the tracker's points cover
 _CALIBRATED_MM, _CHECKED_MM = 200.0, 300.0
-_LOST = {
-    "eq. (1)": ("vector loop", "r = a_i + l1 u_i + l2 w_i"),
-    "eq. (2)": ("direction of a drive arm", "Rot(Z, beta_i - pi/2) Rot(x_i, -theta_i) e_2"),
-    "eqs. (3) to (7)": ("error model, Q_x and J", "w_i . dr = l1 w_i . du_i, Q_x turns y towards -z; dr = J dtheta"),
-    "eqs. (8) and (9)": ("model distance and its first-order form, A_j", "|r_j - r_1|, its derivative by dtheta"),
-    "eqs. (10) to (12)": ("optical centre, measured distance, B_j", "O_cj = -R_j^T T_j, |O_cj - O_c1|"),
-    "eqs. (13) to (15)": (
-        "distance error and the system H dtheta = b",
-        "least squares, H^+ = (H^T H)^-1 H^T as printed",
-    ),
-    "Table 1": ("zero errors that were found", "zero errors of the virtual robot, chosen"),
-    "Figures 7 and 8": ("error over the plane", "the largest and the mean error in the text"),
-    "dimensions": ("none are printed", "l1 375 mm, l2 900 mm, a 125 mm, chosen"),
-}
+_LOST = paper.read_lost(Path(__file__).with_name("lost.csv"))
 
 
 def disc(height_mm, radius_mm, count):

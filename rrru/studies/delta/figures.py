@@ -125,11 +125,8 @@ def _map(axes, rows, title):
 
 def _sizes(axes, calibrations, draws, frame, title):
     """Mean and largest error of every variant in a frame, and the mean's range over draws."""
-    rows, mean, largest = (
-        np.arange(len(calibrations)),
-        calibrations[f"{frame}_mean_mm"],
-        calibrations[f"{frame}_max_mm"],
-    )
+    mean, largest = (calibrations[f"{frame}_{of}_mm"] for of in ("mean", "max"))
+    rows = np.arange(len(calibrations))
     low, high = (draws[f"{frame}_mean_{side}_mm"].to_numpy() for side in ("low", "high"))
     axes.hlines(rows, low, high, **_DRAWS, label=f"mean in {draws['draws'].max():g} draws, 5 to 95 %")
     axes.hlines(rows, mean, largest, **_RANGE)

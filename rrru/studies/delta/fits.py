@@ -3,14 +3,13 @@
 The same calibrations are made with other plates and on other robots too, since one draw may favour a variant.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
 
 from rrru.campaign.measurements import vector_columns, vectors
-from rrru.studies.delta.variants import VARIANTS, Seen
-from rrru.studies.delta.zero_offset import taken_for_errors
+from rrru.studies.delta.variants import VARIANTS, Seen, taken_for_errors
 
 # a target that is 0.1 mm per m too large
 _SCALE_ERROR = 1e-4
@@ -112,16 +111,6 @@ def _sizes(points):
     return {f"{frame}_{of}_mm": points[column].agg(of) for frame, column in frames for of in ("mean", "max")}
 
 
-@dataclass(frozen=True)
-class Spread:
-    """Draws of plate and noise; robots, with 1 sigma of their zero errors and of all lengths (several values)."""
-
-    draws: int
-    robots: int
-    zero_rad: float
-    lengths_mm: tuple[float, ...]
-
-
 def other_draws(twin, truth, errors):
     """Rows of `delta_draws`: errors on the plane before and after every variant, over random draws.
 
@@ -142,18 +131,19 @@ def other_draws(twin, truth, errors):
 
 
 def other_robots(twin, truth, errors, spread):
-    """Rows of `delta_robots`: errors on the plane over robots with drawn zero and length errors; spread: `Spread`.
+    """Rows of `delta_robots`: errors on the plane over robots with drawn zero and length errors.
 
     truth, errors: as in `other_draws`; the robots use the draws in turn, since their cameras see nearly the same dots.
-    Every size of length errors has the same zero errors, directions and noise.
+    Every size of length errors has the same zero errors, directions and noise. spread: the configuration's
+    `delta.spread`: number of robots, 1 sigma of their zero errors and of all lengths (several values).
     """
     poses, rows = (truth["plane"].to_numpy(), vectors(truth, "command")), []
-    for length in spread.lengths_mm:
+    for length in spread["lengths_mm"]:
         measured = []
-        for number in range(spread.robots):
+        for number in range(spread["robots"]):
             robot = replace(twin, labels=("robots", number))
             unit = robot.generator().standard_normal(len(twin.deviations))
-            robot = replace(robot, deviations=unit * np.where(np.arange(len(unit)) < 3, spread.zero_rad, length))
+            robot = replace(robot, deviations=unit * np.where(np.arange(len(unit)) < 3, spread["zero_rad"], length))
             measured.append(plane_sizes(robot, *poses, errors[number % len(errors)]))
         for name in measured[0]:
             median, high = np.percentile([sizes[name] for sizes in measured], [50.0, 90.0], axis=0)

@@ -7,7 +7,7 @@ the configured robot replaces the configuration, and the search is repeated in a
 angles in rad.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from scipy.optimize import differential_evolution
@@ -15,7 +15,7 @@ from scipy.optimize import differential_evolution
 from rrru.campaign.measurements import vectors
 from rrru.estimation.observations.distances import Distances
 from rrru.studies.delta.published import RESULTS
-from rrru.studies.delta.zero_offset import one_step
+from rrru.studies.delta.variants import one_step
 
 # paper C, 3.2 and 3.3: errors on the plane z = 0 in mm
 _NAMES = ("before_mean", "before_max", "after_mean", "after_max")
@@ -24,15 +24,6 @@ _PUBLISHED_MM = np.array([number.value for name in _NAMES for number in RESULTS 
 _ZERO_RAD, _LENGTH_MM = 0.02, 0.3
 # ASSUME penalty, in units of the misfit, of length errors at their bound; the fourth power weights the longest most
 _PENALTY = 0.05
-
-
-@dataclass(frozen=True)
-class Search:
-    """Number of draws, generations, and the searched fraction of the bounds about the configured twin."""
-
-    draws: int
-    generations: int
-    share: float
 
 
 def numbers(twin, command_mm, centre_errors_mm):
@@ -60,9 +51,11 @@ def misfit(reached_mm):
 
 
 def search(twin, truth, centre_errors, settings):
-    """Deviations (12,) of the best twin by differential evolution and its misfit; settings: `Search`.
+    """Deviations (12,) of the best twin by differential evolution and its misfit.
 
-    truth: the table `delta_truth`; centre_errors: those of the draws, see `draws.drawn_errors`.
+    truth: the table `delta_truth`; centre_errors: those of the draws, see `draws.drawn_errors`; settings: the
+    configuration's `delta.search`: number of draws, generations, and the searched fraction of the bounds about the
+    configured twin.
     """
     first = (truth["plane"] == "first").to_numpy()
     command, seen = vectors(truth, "command")[first], [errors["centre"][first] for errors in centre_errors]
@@ -75,8 +68,8 @@ def search(twin, truth, centre_errors, settings):
         return misfit_of(deviations) + _PENALTY * ((deviations[~angle] / _LENGTH_MM) ** 4).mean() ** 0.25
 
     limit = np.where(angle, _ZERO_RAD, _LENGTH_MM)
-    low, high = (np.clip(twin.deviations + side * settings.share * limit, -limit, limit) for side in (-1.0, 1.0))
-    options = {"maxiter": settings.generations, "popsize": 5, "tol": 0.0, "polish": False}
+    low, high = (np.clip(twin.deviations + side * settings["share"] * limit, -limit, limit) for side in (-1.0, 1.0))
+    options = {"maxiter": settings["generations"], "popsize": 5, "tol": 0.0, "polish": False}
     bounds = list(zip(low, high, strict=True))
     result = differential_evolution(penalised, bounds, rng=twin.generator("search"), **options)
     return result.x, misfit_of(result.x)

@@ -85,27 +85,13 @@ condition              float? largest over smallest singular value of the Jacobi
 residual_rms_mm        float? RMS residual of the fit
 noise_mm               float? noise of one axis estimated from it, assumed equal along all axes (optical centres' is
     larger along the target than across); length errors count as noise here
-dtheta1_true_rad       float? true zero error of drive 1
-dtheta2_true_rad       float? true zero error of drive 2
-dtheta3_true_rad       float? true zero error of drive 3
-dtheta1_found_rad      float? zero error found of drive 1
-dtheta2_found_rad      float? zero error found of drive 2
-dtheta3_found_rad      float? zero error found of drive 3
-dtheta1_error_rad      float? found minus true zero error of drive 1
-dtheta2_error_rad      float? found minus true zero error of drive 2
-dtheta3_error_rad      float? found minus true zero error of drive 3
-dtheta1_standard_error_rad float? standard error from noise_mm as if the lengths were exact, the first pose's noise in
-    all distances counted: zero error of drive 1
-dtheta2_standard_error_rad float? standard error from noise_mm as if the lengths were exact, the first pose's noise in
-    all distances counted: zero error of drive 2
-dtheta3_standard_error_rad float? standard error from noise_mm as if the lengths were exact, the first pose's noise in
-    all distances counted: zero error of drive 3
-dtheta1_length_error_rad float? 1 sigma of the bias from unknown length errors of all legs (`delta.length_error_mm`),
-    in addition to the standard error: zero error of drive 1
-dtheta2_length_error_rad float? 1 sigma of the bias from unknown length errors of all legs (`delta.length_error_mm`),
-    in addition to the standard error: zero error of drive 2
-dtheta3_length_error_rad float? 1 sigma of the bias from unknown length errors of all legs (`delta.length_error_mm`),
-    in addition to the standard error: zero error of drive 3
+dtheta{123}_true_rad       float? true zero error of drive {123}
+dtheta{123}_found_rad      float? zero error found of drive {123}
+dtheta{123}_error_rad      float? found minus true zero error of drive {123}
+dtheta{123}_standard_error_rad float? standard error from noise_mm as if the lengths were exact, the first pose's noise
+    in all distances counted: zero error of drive {123}
+dtheta{123}_length_error_rad float? 1 sigma of the bias from unknown length errors of all legs
+    (`delta.length_error_mm`), in addition to the standard error: zero error of drive {123}
 plane_mean_mm          float  mean error on the plane, in the calibration frame, as published
 plane_max_mm           float  largest error on the plane, in the calibration frame, as published
 base_mean_mm           float  mean error on the plane, in the frame of the robot's base
@@ -116,9 +102,7 @@ Observable combinations of the three zero errors by variant, best first, and the
 --
 variant
 direction              int    1: best observable
-weight_dtheta1         float  share of dtheta1 in the unit direction
-weight_dtheta2         float  share of dtheta2 in the unit direction
-weight_dtheta3         float  share of dtheta3 in the unit direction
+weight_dtheta{123}         float  share of dtheta{123} in the unit direction
 common_share           float  squared component of the direction with equal errors of all drives
 kind                   str    common: that part is more than half {common, differential}
 singular_value         float  change of the data, in mm of one axis's noise, per mm of arc at the end of the drive

@@ -1,15 +1,19 @@
-"""Every variant to estimate the Delta's zero errors: its input and its residuals. Lengths in mm, angles in rad."""
+"""Every variant to estimate the Delta's zero errors: its input and its residuals, and the paper's step.
 
-from dataclasses import dataclass
+Places are known up to a rigid motion. Readings are `rrru.estimation.observations`: `Distances` (paper C, eqs. 8 to 15),
+`Shape`, `TargetHeights`. Lengths in mm, angles in rad.
+"""
+
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rrru.calibration.calibrate import calibrate, estimate_deviations
+from rrru.calibration.calibrate import assess, calibrate, estimate_deviations, estimate_deviations_at
+from rrru.calibration.identifiability import analyse
 from rrru.campaign.measurements import vectors
 from rrru.estimation.observations.distances import Distances, Shape
 from rrru.estimation.observations.target_positions import TargetHeights, TargetPositions
 from rrru.simulation.tracker import measure
-from rrru.studies.delta.zero_offset import one_step, step_fit
 
 
 @dataclass(frozen=True)
@@ -94,3 +98,43 @@ VARIANTS = (
     Variant("tracker_positions", "tracker", "positions", "one"),
 )
 PAPER = VARIANTS[0]
+
+
+# --- the paper's step, and its omitted-variable bias
+
+
+def one_step(residuals):
+    """Deviations (p,) by one step from the nominal robot: the paper's for `Distances` of equal weight (eq. 15)."""
+    nominal = residuals.mechanism.parameters.nominal
+    return nominal + taken_for_errors(residuals, residuals.residual(nominal)[..., None])[:, 0]
+
+
+def step_fit(distances):
+    """Calibration by the paper's step on `Distances` of equal weight, and the covariance (p, p) of its deviations.
+
+    With J' J instead of the optimal weights the covariance is s^2 J^+ C J^+', C that of the distances, and s^2 the sum
+    of squared residuals over the trace of (I - J J^+) C. Singular values are those of the whitened distances, as in
+    every other fit.
+    """
+    deviations = one_step(distances)
+    plain = assess(estimate_deviations_at(distances, deviations, "one step", 1))
+    nominal = distances.mechanism.parameters.nominal
+    jacobian = distances.jacobian(nominal)[:, 0]
+    inverse = np.linalg.pinv(jacobian)
+    left = distances.covariance - jacobian @ (inverse @ distances.covariance)
+    noise = np.sqrt((plain.residual_mm**2).sum() / np.trace(left))
+    covariance = noise**2 * inverse @ distances.covariance @ inverse.T
+    identifiability = analyse(distances.mechanism, replace(distances, alike=False).jacobian(deviations))
+    errors = np.sqrt(np.diag(covariance))
+    return replace(plain, noise_mm=float(noise), standard_errors=errors, identifiability=identifiability), covariance
+
+
+def taken_for_errors(residuals, changes):
+    """Bias (p, q) of a fit from changes of its residuals (m, k, q) that are not in its model, to first order.
+
+    Changes are derivatives of measured minus model values: of the model by other deviations, or of the measurement by
+    an instrument's errors.
+    """
+    jacobian = residuals.jacobian(residuals.mechanism.parameters.nominal)
+    flat = jacobian.reshape(-1, jacobian.shape[-1])
+    return -np.linalg.lstsq(flat, np.asarray(changes).reshape(len(flat), -1), rcond=None)[0]

@@ -1,7 +1,5 @@
 """Figure of all methods on all robots: residual errors inside and outside their region, and with fewer points."""
 
-from matplotlib.ticker import LogLocator
-
 from rrru.errors import ConfigError
 from rrru.figures import style
 from rrru.figures.choose import where
@@ -68,7 +66,7 @@ def _residual_errors(axes, results, shown, before):
     axes.axvline(before, label="before, mean inside", **_BEFORE)
     axes.set(xscale="log", ylim=(len(shown) - 0.5, -0.5), xlabel="error (mm)")
     axes.set_yticks(range(len(shown)), [_METHODS[name][0] for name in shown])
-    _ticks(axes.xaxis)
+    style.short_log(axes.xaxis)
     axes.grid(True, axis="x")
 
 
@@ -83,11 +81,5 @@ def _learning(axes, curves, before):
     axes.set(xscale="log", yscale="log", xlabel="points")
     axes.set_xticks(counts, [f"{count:g}" for count in counts])
     axes.set_xticks([], minor=True)
-    _ticks(axes.yaxis)
+    style.short_log(axes.yaxis)
     axes.grid(True)
-
-
-def _ticks(axis):
-    """Labels at 1 and 3 of every decade, so that a short axis has some too."""
-    axis.set_major_locator(LogLocator(subs=(1.0, 3.0)))
-    style.plain_log(axis)

@@ -3,6 +3,8 @@
 Its dimensions are lost too: Ptt3's nominal ones are used instead.
 """
 
+from pathlib import Path
+
 import numpy as np
 
 from rrru.kinematics import singularity
@@ -18,31 +20,7 @@ _ROBOTS = (Ptt3(R_mm=60.0, r_mm=60.0), Ptt3())
 # links 0.001 mm from upright
 _UPRIGHT = np.array([[0.0, 0.0, -np.sqrt(_ROBOTS[0].L_mm ** 2 - 1e-6)]])
 _CONSTRAINT = ("section 2.2 and conclusion (2)", "a constraint singularity at R = r, so none for r < R")
-_LOST = {
-    "Table 1": ("dimensions of the robot", "L 350 mm, R 300 mm, r 60 mm, chosen"),
-    "Table 2": ("five positions through inverse and forward solution", "five positions of our own in the tests"),
-    "Table 3": ("conditions of the five experiments", "1 and 2 from the text; for 3 to 5 three payloads, chosen"),
-    "Table 4": ("readings of the backlash measurement", "readings of a virtual encoder"),
-    "Table 5": ("backlash of every screw under every load", "backlash of the virtual robot, chosen"),
-    "Table 6": ("repeatability per unit travel", "only its order, better with compensation, can be compared"),
-    "Table 7": ("tracker readings of experiment 3", "nothing"),
-    "Table 8": ("errors before and after", "only the least benefits, 90 % and 80 %, can be compared"),
-    "eq. (1)": ("closure of a leg", "|P - E_i| = L, E_i = (R - r + b_i) e_i"),
-    "eq. (2)": ("inverse solution", "b_i = u_i - (R - r) + sqrt(L^2 - v_i^2 - Z^2)"),
-    "eq. (3)": ("forward solution", "lower point of three spheres"),
-    "eq. (4)": ("J", "row i: link direction over its share along rail i"),
-    "eq. (5)": ("det J and its factors k1, k2", "det J = -Z kappa / (D1 D2 D3)"),
-    "eqs. (6) to (9)": ("where det J vanishes, and most of the sentence before them", "Z = 0 or kappa = 0"),
-    "eqs. (14) to (17)": ("Gaussian, hidden layer, weights, output", "a Gaussian network as the text describes it"),
-    "eq. (18)": ("path of the platform, with the constants r1 and C", "a path of 180 positions, chosen"),
-    "eq. (19)": ("backlash from the encoder's readings", "difference of the mean readings, 10 turns forwards and back"),
-    "eq. (20)": ("repeatability per unit travel", "spread of 7 repeats over the travel"),
-    "eq. (21)": (
-        "benefit, and the mean errors A_b and A_a in it",
-        "1 - A_a / A_b, means of absolute errors: signed ones may cancel",
-    ),
-    "Figures 10 to 18": ("curves", "the statements about them in the text"),
-}
+_LOST = paper.read_lost(Path(__file__).with_name("lost.csv"))
 
 
 @finding(

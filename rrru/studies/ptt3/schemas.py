@@ -33,9 +33,7 @@ Inverse and forward kinematics of given positions (paper B, Table 2), and det J 
 --
 position               int    number of the position
 given_{xyz}_mm         float  given position
-slider1_mm             float  position of slider 1 by eq. (2)
-slider2_mm             float  position of slider 2 by eq. (2)
-slider3_mm             float  position of slider 3 by eq. (2)
+slider{123}_mm         float  position of slider {123} by eq. (2)
 forward_{xyz}_mm       float  position that these give by the forward kinematics
 difference_mm          float  distance between the two
 determinant            float  det J of eq. (10), numerically

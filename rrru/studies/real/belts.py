@@ -17,14 +17,13 @@ of the frame and a common factor of all belts are not identifiable either; the f
 """
 
 import numpy as np
-import pandas as pd
 from scipy import linalg
 
 from rrru.estimation.observations.length_starts import propose_anchors
 from rrru.estimation.observations.lengths import Lengths
 from rrru.studies.real import length_tables
 from rrru.studies.real.length_models import UNEXPLAINED, LengthCase, frame_columns, variants_of
-from rrru.studies.real.lengths_section import MM, Section, held_out, numbers, row_numbers
+from rrru.studies.real.lengths_section import MM, Section, numbers
 
 MISSING, SCALE = "missing_length", "length_scale"
 _NEEDED, _OPTIONAL = ("kind", "files", "lengths"), ("heights_mm", "unit", "row", "dimensions")
@@ -44,18 +43,10 @@ def study(frame, section, name):
     case, belts = length_case(frame, read)
     verdict = case.verdict()
     chosen = verdict[2]
-    steps, step_errors = length_tables.steps(case, _chain(case, chosen), held_out(frame, read))
-    notes, where, next_runs, rivals = _words(case, verdict, belts)
-    row = length_tables.verdict_row(
-        case, verdict, step_errors, where=where, confounded_with=rivals, next_runs=next_runs
+    parameters = _parameters(case, chosen, belts)
+    return length_tables.tables(
+        frame, read, case, verdict, belts, _chain(case, chosen), parameters, _words(case, verdict, belts)
     )
-    row |= {"notes": " ".join([*notes, *length_tables.bad_words(case, belts, row_numbers(frame, read))])}
-    return {
-        "real_verdicts": pd.DataFrame([row]),
-        "real_steps": steps,
-        "real_parameters": pd.DataFrame(_parameters(case, chosen, belts)),
-        "real_points": length_tables.points(case, chosen, belts, row_numbers(frame, read)),
-    }
 
 
 def length_case(frame, read):
@@ -91,7 +82,7 @@ def _missing(bare, belts):
     variants = [("all belts alike", "a common missing length", starts.sum(axis=1, keepdims=True), _ALIKE)]
     variants += [(belt, f"a missing length of {belt}", starts[:, [k]], _SINGLE / count) for k, belt in enumerate(belts)]
     variants += [(", ".join(belts), "a missing length per belt", starts, _EACH)]
-    return variants_of(MISSING, variants, lambda columns: np.full(columns.shape[1], span))
+    return variants_of(MISSING, variants, span)
 
 
 def _scale(bare):
@@ -99,7 +90,7 @@ def _scale(bare):
     count = bare.counted.shape[1]
     factors = np.eye(len(bare.origin))[:, -count:] @ linalg.null_space(np.ones((1, count)))
     variants = [("each belt its own", "a scale per belt", factors, _SCALED)]
-    return variants_of(SCALE, variants, lambda columns: np.full(columns.shape[1], _SCALE_RANGE))
+    return variants_of(SCALE, variants, _SCALE_RANGE)
 
 
 def _starts(lengths):
@@ -172,16 +163,15 @@ def _independent_error(hypothesis):
 
 
 def _words(case, verdict, belts):
-    """Notes (sentences), where, next_runs and confounded effects of a verdict."""
+    """Notes (sentences) of a verdict, and its columns where, confounded_with and next_runs."""
     effects, _, chosen = verdict
     notes, where, rivals = [], [], []
     if MISSING in effects:
         effect_model = next(effect_model for effect_model in chosen.effect_models if effect_model.effect == MISSING)
         where.append(effect_model.where)
         notes.append(_missing_words(case, chosen, effect_model, belts))
-        if case.probability_of(lambda effect_models: effect_model in effect_models) < 0.9 * case.probability_of(
-            _misses
-        ):
+        one, any_of_them = (case.probability_of(asked) for asked in (lambda models: effect_model in models, _misses))
+        if one < 0.9 * any_of_them:
             notes.append("These rows do not determine whether all belts miss the same length.")
             rivals.append("missing_length of other belts")
     else:
@@ -195,10 +185,7 @@ def _words(case, verdict, belts):
             f"Belt {belts[high]} is longer than counted by {1e3 * scale[high]:.2f} mm per m and {belts[low]} by"
             f" {1e3 * scale[low]:.2f}, against the mean of all belts."
         )
-    elif (
-        case.probability_of(lambda effect_models: SCALE in [effect_model.effect for effect_model in effect_models])
-        > 0.1
-    ):
+    elif case.probability_of(lambda models: SCALE in [model.effect for model in models]) > 0.1:
         notes.append("A separate scale per belt is possible; these rows do not determine it.")
         rivals.append(SCALE)
     if UNEXPLAINED in effects:
@@ -209,7 +196,8 @@ def _words(case, verdict, belts):
     next_runs = "one tape measurement between two anchors: lengths alone do not determine a common scale of all belts"
     if {SCALE, UNEXPLAINED} & set(effects):
         next_runs += "; the same places again with more belt tension: stretch changes, scales do not"
-    return notes, ", ".join(where), next_runs, ", ".join(dict.fromkeys(rivals))
+    rivals = ", ".join(dict.fromkeys(rivals))
+    return notes, {"where": ", ".join(where), "confounded_with": rivals, "next_runs": next_runs}
 
 
 def _misses(effect_models):

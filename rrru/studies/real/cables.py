@@ -20,12 +20,11 @@ confounded with a common factor of the radii.
 """
 
 import numpy as np
-import pandas as pd
 
 from rrru.estimation.observations.lengths import Lengths
 from rrru.studies.real import length_tables
 from rrru.studies.real.length_models import UNEXPLAINED, LengthCase, variants_of
-from rrru.studies.real.lengths_section import MM, RAD, Section, held_out, numbers, row_numbers
+from rrru.studies.real.lengths_section import MM, RAD, Section, numbers
 
 RADIUS = "drum_radius"
 _NEEDED = ("kind", "files", "drums", "anchors", "distances", "position")
@@ -48,17 +47,9 @@ def study(frame, section, name):
     chosen = verdict[2]
     effect_models = case.effect_models[RADIUS]
     chain = list(dict.fromkeys([(), (effect_models[0],), (effect_models[-1],), chosen.effect_models]))
-    steps, errors = length_tables.steps(case, chain, held_out(frame, read))
-    notes, where, next_runs, rivals = _words(case, verdict, drums)
-    row = length_tables.verdict_row(case, verdict, errors, where=where, confounded_with=rivals, next_runs=next_runs)
-    rows = row_numbers(frame, read)
-    row |= {"notes": " ".join([*notes, *length_tables.bad_words(case, drums, rows)])}
-    return {
-        "real_verdicts": pd.DataFrame([row]),
-        "real_steps": steps,
-        "real_parameters": pd.DataFrame(_parameters(case, chosen, drums, anchors)),
-        "real_points": length_tables.points(case, chosen, drums, rows),
-    }
+    parameters = _parameters(case, chosen, drums, anchors)
+    words = _words(case, verdict, drums)
+    return length_tables.tables(frame, read, case, verdict, drums, chain, parameters, words)
 
 
 def cable_case(frame, read):
@@ -127,8 +118,7 @@ def _radii(bare, drums, radii):
     ]
     variants += [(drum, f"the radius of {drum}", factors[:, [k]], _SINGLE / len(drums)) for k, drum in enumerate(drums)]
     variants += [(", ".join(drums), "a radius per drum", factors, _EACH)]
-    prior_sd = _RADIUS_SHARE * radii.mean()
-    return variants_of(RADIUS, variants, lambda columns: np.full(columns.shape[1], prior_sd))
+    return variants_of(RADIUS, variants, _RADIUS_SHARE * radii.mean())
 
 
 def _starts(lengths):
@@ -167,7 +157,7 @@ def _parameters(case, chosen, drums, anchors):
 
 
 def _words(case, verdict, drums):
-    """Notes (sentences), where, next_runs and confounded effects of a verdict."""
+    """Notes (sentences) of a verdict, and its columns where, confounded_with and next_runs."""
     effects, _, chosen = verdict
     possible, poses = case.effect_models[RADIUS], len(case.used)
     off = case.probability_of(lambda effect_models: bool(effect_models))
@@ -200,4 +190,5 @@ def _words(case, verdict, drums):
     notes.append("A scale error of the camera would act as a common factor of the radii.")
     if UNEXPLAINED in effects:
         notes.append(f"No effect model explains a smooth residual of {chosen.smooth_mm:.1f} mm that follows the place.")
-    return notes, where, "; ".join(runs), ", ".join(dict.fromkeys(rivals))
+    rivals = ", ".join(dict.fromkeys(rivals))
+    return notes, {"where": where, "confounded_with": rivals, "next_runs": "; ".join(runs)}

@@ -215,11 +215,11 @@ class LengthCase:
 
 
 def variants_of(effect, variants, prior_sd):
-    """EffectModels of an effect from (where, adds, columns, prior probability); prior_sd(columns): of parameters."""
-    models = []
-    for where, adds, columns, probability in variants:
-        models.append(EffectModel(effect, where, adds, columns, prior_sd(columns), probability))
-    return tuple(models)
+    """EffectModels of an effect from (where, adds, columns, prior probability); prior_sd: of every parameter."""
+    return tuple(
+        EffectModel(effect, where, adds, columns, np.full(columns.shape[1], prior_sd), probability)
+        for where, adds, columns, probability in variants
+    )
 
 
 def frame_columns(count, dimensions, readings):

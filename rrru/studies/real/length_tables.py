@@ -4,11 +4,32 @@ import numpy as np
 import pandas as pd
 
 from rrru.studies.real.length_models import UNEXPLAINED, predict_held_out
+from rrru.studies.real.lengths_section import held_out, row_numbers
 
 # most rows that a note names
 _NAMED = 10
 # draws, blocks and seed of the bootstrap over blocks of rows
 _DRAWS, _BLOCKS, _SEED = 1000, 20, 1
+
+
+def tables(frame, read, case, verdict, readings, chain, parameters, words):
+    """Tables of one calibration: real_verdicts, real_steps, real_parameters, real_points.
+
+    frame, read: one row per place, and its Section; readings: names of the lengths; chain: combinations of effect
+    models for the steps; parameters: rows of real_parameters; words: notes (sentences), and further columns of the
+    verdict.
+    """
+    models, errors = steps(case, chain, held_out(frame, read))
+    notes, columns = words
+    rows = row_numbers(frame, read)
+    row = verdict_row(case, verdict, errors) | columns
+    row |= {"notes": " ".join([*notes, *bad_words(case, readings, rows)])}
+    return {
+        "real_verdicts": pd.DataFrame([row]),
+        "real_steps": models,
+        "real_parameters": pd.DataFrame(parameters),
+        "real_points": points(case, verdict[2], readings, rows),
+    }
 
 
 def parameter(name, unit, value, standard_error, nominal, note):
@@ -33,7 +54,7 @@ def anchors(case, chosen, names, note):
     return rows
 
 
-def steps(case, chain, held_out):
+def steps(case, chain, held):
     """Table real_steps of a chain of combinations of effect models, and the held-out errors (N, k) of each.
 
     Held-out columns: from `predict_held_out`, one value per reading.
@@ -44,7 +65,7 @@ def steps(case, chain, held_out):
         if hypothesis is None:
             continue
         fit = hypothesis.fit
-        errors[tuple(effect_models)] = off = predict_held_out(fit, held_out)
+        errors[tuple(effect_models)] = off = predict_held_out(fit, held)
         adds = "anchors" + ("" if case.bare.places_mm is not None else " and the place of every row")
         rows.append(
             {
@@ -61,8 +82,8 @@ def steps(case, chain, held_out):
     return pd.DataFrame(rows), errors
 
 
-def verdict_row(case, verdict, errors, *, where, confounded_with, next_runs):
-    """The row of real_verdicts without notes; errors: of the steps, with those of the bare frame and of the verdict."""
+def verdict_row(case, verdict, errors):
+    """The row of real_verdicts without words; errors: of the steps, with those of the bare frame and of the verdict."""
     effects, probability, chosen = verdict
     before, after = errors.get((), errors[chosen.effect_models]), errors[chosen.effect_models]
     noise = chosen.noise_mm if UNEXPLAINED in effects else chosen.fit.noise_mm
@@ -71,8 +92,6 @@ def verdict_row(case, verdict, errors, *, where, confounded_with, next_runs):
     return {
         "effects": "+".join(effects) or "none",
         "probability": probability,
-        "where": where,
-        "confounded_with": confounded_with,
         "noise_rms_mm": noise,
         "gap_rms_mm": gaps[0],
         "gap_after_rms_mm": gaps[1],
@@ -80,7 +99,6 @@ def verdict_row(case, verdict, errors, *, where, confounded_with, next_runs):
         "held_out_mean_mm": float(np.nanmean(np.abs(after))),
         "held_out_rms_mm": rms(after),
         "held_out_max_mm": float(np.nanmax(np.abs(after))),
-        "next_runs": next_runs,
         "points": len(case.used),
         "dropped_points": int((~case.used).any(axis=1).sum()),
     }

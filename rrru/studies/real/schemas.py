@@ -40,10 +40,7 @@ held_out_c_rms_mm      float? + compliance, the last of its kinds
 held_out_d_rms_mm      float? + two harmonics of every drive
 held_out_e_rms_mm      float? + drift of the base with the rows
 reference_a_rms_mm     float? published rms of the same model on the same rows; null where none is stated
-reference_b_rms_mm     float? see reference_a_rms_mm
-reference_c_rms_mm     float? see reference_a_rms_mm
-reference_d_rms_mm     float? see reference_a_rms_mm
-reference_e_rms_mm     float? see reference_a_rms_mm
+reference_{bcde}_rms_mm float? see reference_a_rms_mm
 noise_stated_mm        float? noise per axis that the instrument states
 next_runs              str    what to measure next; empty where no measurement helps
 points                 int    rows fitted, one target each
@@ -83,11 +80,9 @@ campaign
 row                    int    number in the file
 reading                str    target, or length
 x_mm                   float? measured position, or position in the verdict's model
-y_mm                   float? see x_mm
-z_mm                   float? see x_mm
+{yz}_mm                float? see x_mm
 bare_x_mm              float? position in the calibrated model; null where it was measured
-bare_y_mm              float? see bare_x_mm
-bare_z_mm              float? see bare_x_mm
+bare_{yz}_mm           float? see bare_x_mm
 bare_residual_mm       float? distance to the calibrated model, of lengths the signed difference
 residual_mm            float? distance to the verdict's model, of lengths the signed difference
 used                   bool   whether it was used in the fit

@@ -1,7 +1,5 @@
 """Least mean distance of many draws on a linearised model, fast enough for every candidate of the twin's search."""
 
-from typing import NamedTuple
-
 import numba
 import numpy as np
 
@@ -29,9 +27,16 @@ def linear_fit(mechanism, theta, measured, start):
         deviations = np.clip(deviations + step, parameters.low, parameters.high)
     residual, jacobian = _linearised(mechanism, theta, centre, start, deviations)
     whitened = np.linalg.qr(jacobian.reshape(-1, len(deviations)))
-    back = np.linalg.inv(whitened.R)
-    bounds = _bounds(back, deviations, parameters.low, parameters.high)
-    q, value = _least_mean(residual + (measured - centre), whitened.Q.reshape(jacobian.shape), bounds)
+    back, basis, residual = (
+        np.linalg.inv(whitened.R),
+        whitened.Q.reshape(jacobian.shape),
+        residual + (measured - centre),
+    )
+    # place of the deviations within their bounds, in half widths: middle + over q, violated beyond 1
+    half = 0.5 * (parameters.high - parameters.low)
+    middle, over = (deviations - 0.5 * (parameters.high + parameters.low)) / half, back / half[:, None]
+    start, gram = np.einsum("dna,nap->dp", residual, basis), np.einsum("nap,naq->npq", basis, basis)
+    q, value = _newton(*map(np.ascontiguousarray, (residual, basis, gram, start, over, middle)))
     return deviations + q @ back.T, value
 
 
@@ -44,32 +49,13 @@ def _linearised(mechanism, theta, measured, start, deviations):
     return residual, jacobian
 
 
-class _Bounds(NamedTuple):
-    """Place of deviations within their bounds, in half widths: middle (p,) + back (p, p) q; violated beyond 1."""
-
-    back: np.ndarray
-    middle: np.ndarray
-
-
-def _bounds(back, centre, low, high):
-    """The _Bounds of deviations centre + back q."""
-    half = 0.5 * (high - low)
-    return _Bounds(np.ascontiguousarray(back / half[:, None]), (centre - 0.5 * (high + low)) / half)
-
-
-def _least_mean(residual, basis, bounds):
-    """Coordinates q (d, p) that minimise the mean distances of residuals (d, n, 3) - basis (n, 3, p) q, and the minima.
-
-    Damped Newton from least squares; the basis is orthonormal.
-    """
-    start, gram = np.einsum("dna,nap->dp", residual, basis), np.einsum("nap,naq->npq", basis, basis)
-    arrays = (residual, basis, gram, start, bounds.back, bounds.middle)
-    return _newton(*(np.ascontiguousarray(array) for array in arrays))
-
-
 @numba.njit(cache=True)
 def _newton(residual, basis, gram, start, back, middle):
-    """The result of `_least_mean`, one draw after another; gram (n, p, p): basis^T basis of every point."""
+    """Coordinates q (d, p) that minimise the mean distances of residuals (d, n, 3) - basis (n, 3, p) q, and the minima.
+
+    Damped Newton from least squares, one draw after another; the basis is orthonormal. gram (n, p, p): basis^T basis of
+    every point; middle (p,) + back (p, p) q: place within the bounds, violated beyond 1.
+    """
     draws, points, size = residual.shape[0], residual.shape[1], basis.shape[2]
     found, least = start.copy(), np.empty(draws)
     left, moved, along = np.empty((points, 3)), np.empty((points, 3)), np.empty(size)

@@ -1,7 +1,5 @@
 """Paper A's numbers compared with this study's, from the configuration and the tables of the reproduced campaign."""
 
-from dataclasses import dataclass
-
 import numpy as np
 import pandas as pd
 
@@ -18,30 +16,20 @@ from rrru.studies.rrru3.sweep_match import PRINTED, nearest_seed
 _DIMENSIONS = ("L1_mm", "L2_mm", "L3_mm", "R_mm", "r_mm")
 
 
-@dataclass(frozen=True)
-class Reproduced:
-    """The campaign, calibrations and method that correspond to the paper's."""
-
-    campaign: str
-    line_calibration: str
-    spiral_calibration: str
-    method: str
-
-
 def published_rows(settings, errors, calibrations, parameters, genetic, genetic_parameters, sweep_runs, redraw_counts):
     """Rows of `published` for paper A.
 
     settings: the configuration's `genetic` and `reproduce`, with the campaign's `nominal` robot and its `virtual`
     part; the others: the tables of those names. Numbers that this study does not have are null.
     """
-    chosen, nominal, virtual = Reproduced(**settings["reproduce"]), settings["nominal"], settings["virtual"]
+    chosen, nominal, virtual = settings["reproduce"], settings["nominal"], settings["virtual"]
     errors, calibrations, parameters, genetic, found = (
-        table[table["campaign"] == chosen.campaign]
+        table[table["campaign"] == chosen["campaign"]]
         for table in (errors, calibrations, parameters, genetic, genetic_parameters)
     )
     names = setup.mechanism(nominal).parameters.names
     parameters = pd.concat([parameters, typical_parameters(genetic, found, (*names, "dR", "dr"))], ignore_index=True)
-    runs = genetic[genetic["calibration"] == chosen.line_calibration]
+    runs = genetic[genetic["calibration"] == chosen["line_calibration"]]
     numbers, order_notes = _error_numbers(errors, parameters, chosen)
     swept, swept_spread = _sweep(sweep_runs, settings["genetic"]["operators"])
     here = {
@@ -107,9 +95,9 @@ def _fitted(parameters, chosen):
     """The printed 14 deviations of both calibrations; dR and dr separately are from the median genetic run."""
     values = parameters.set_index(["calibration", "method", "parameter"])["value"]
     result = {}
-    for label, calibration in (("lines", chosen.line_calibration), ("spiral", chosen.spiral_calibration)):
+    for label, calibration in (("lines", chosen["line_calibration"]), ("spiral", chosen["spiral_calibration"])):
         for name in (*TIED, "da"):
-            key = (calibration, "genetic" if name in ("dR", "dr") else chosen.method, name)
+            key = (calibration, "genetic" if name in ("dR", "dr") else chosen["method"], name)
             if key in values:
                 result |= {f"{label}_{printed}": values[key] for printed in TIED_TO_PRINTED.get(name, (name,))}
     return result
@@ -120,12 +108,13 @@ def _error_numbers(errors, parameters, chosen):
 
     Empty for a campaign that was not driven again along the paper's trajectories.
     """
-    again = errors[(errors["mode"] == "closed_loop") & (errors["method"] == chosen.method)]
+    names = (chosen["line_calibration"], chosen["spiral_calibration"])
+    again = errors[(errors["mode"] == "closed_loop") & (errors["method"] == chosen["method"])]
     before, lines, spiral = (
         frame.sort_values(["run", "point"])
         for frame in (
             errors[errors["mode"] == "before"],
-            *(again[again["calibration"] == name] for name in (chosen.line_calibration, chosen.spiral_calibration)),
+            *(again[again["calibration"] == name] for name in names),
         )
     )
     if not len(before) == len(lines) == len(spiral) > 0 or not set(before["trajectory"]) >= computed.TRAJECTORIES:
@@ -142,16 +131,16 @@ def _error_numbers(errors, parameters, chosen):
 def _links(parameters, chosen):
     """Margin of the link errors' order, from the estimates of both calibrations."""
     values = parameters.set_index(["calibration", "method", "parameter"])["value"]
-    names = (chosen.line_calibration, chosen.spiral_calibration)
-    found = [[values.get((name, chosen.method, link)) for link in computed.LINKS] for name in names]
+    names = (chosen["line_calibration"], chosen["spiral_calibration"])
+    found = [[values.get((name, chosen["method"], link)) for link in computed.LINKS] for name in names]
     return {} if None in [*found[0], *found[1]] else computed.link_order(*found)
 
 
 def _objective(calibrations, runs, chosen):
     """Mean residual distance in mm of the line calibration on its own points."""
-    if chosen.method == "genetic":
+    if chosen["method"] == "genetic":
         return runs["objective_mm"].median()
-    fitted = (calibrations["calibration"] == chosen.line_calibration) & (calibrations["method"] == chosen.method)
+    fitted = (calibrations["calibration"] == chosen["line_calibration"]) & (calibrations["method"] == chosen["method"])
     return calibrations.loc[fitted, "mean_mm"].mean()
 
 
@@ -160,7 +149,7 @@ def _notes(runs, parameters, chosen):
     if runs.empty:
         return {}
     values = parameters.set_index(["calibration", "method", "parameter"])["value"]
-    difference = values[chosen.line_calibration, "genetic", "da"]
+    difference = values[chosen["line_calibration"], "genetic", "da"]
     typical = f"here the genetic algorithm's median run, whose dr - dR is {difference:.4f} mm"
     reached = f"{runs['objective_mm'].min():.4f} to {runs['objective_mm'].max():.4f} mm"
     return {

@@ -11,6 +11,7 @@ import logging
 import multiprocessing
 import time
 from contextlib import contextmanager
+from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
@@ -179,18 +180,8 @@ def _key(task, section, start):
     same = {
         name: value for name, value in section.items() if name not in ("hours", "restarts", "hypotheses", "tradeoff")
     }
-    names = (
-        "motion",
-        "trajectories",
-        "noise_mm",
-        "line_calibration",
-        "of_model",
-        "registered",
-        "more",
-        "spikes",
-        "weights",
-    )
-    parts = [same, [getattr(task, name) for name in names], task.bounds, start and start.values]
+    own = [getattr(task, one.name) for one in fields(task) if one.name not in ("mechanism", "draws")]
+    parts = [same, own, task.bounds, start and start.values]
     digest = hashlib.sha256(json.dumps(parts, sort_keys=True).encode())
     for drawn in task.draws:
         digest.update(np.ascontiguousarray(drawn).tobytes())

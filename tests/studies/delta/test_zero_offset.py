@@ -8,7 +8,7 @@ from rrru.errors import FitError
 from rrru.estimation.observations.distances import Distances, Shape
 from rrru.estimation.observations.target_positions import TargetHeights
 from rrru.robots.delta import Delta
-from rrru.studies.delta.zero_offset import one_step, step_fit, taken_for_errors
+from rrru.studies.delta.variants import one_step, step_fit, taken_for_errors
 from tests.estimation.observations.test_distances import COMMAND, ROBOT, THETA, TRUE, moved
 
 LEGS = Delta(parameter_set="legs")

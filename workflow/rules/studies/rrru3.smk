@@ -14,10 +14,10 @@ _PAPER_A = "rrru.studies.rrru3.figures"
 PAPER_A_FIGURES = {
     "fig06": (f"{_PAPER_A}.sweep:fig06", _SWEEP_SHOWN),
     "fig07": (f"{_PAPER_A}.sweep:fig07", _SWEEP_SHOWN),
-    "fig09": (f"{_PAPER_A}.lines:fig09", ["measurements", "errors", "redraw_errors"]),
-    "fig10": (f"{_PAPER_A}.lines:fig10", ["measurements", "errors", "redraw_errors"]),
-    "fig11": (f"{_PAPER_A}.spiral:fig11", ["measurements", "errors", "redraw_errors"]),
-    "fig12": (f"{_PAPER_A}.lines:fig12", ["measurements", "errors", "redraw_errors"]),
+    "fig09": (f"{_PAPER_A}.trajectories:fig09", ["measurements", "errors", "redraw_errors"]),
+    "fig10": (f"{_PAPER_A}.trajectories:fig10", ["measurements", "errors", "redraw_errors"]),
+    "fig11": (f"{_PAPER_A}.trajectories:fig11", ["measurements", "errors", "redraw_errors"]),
+    "fig12": (f"{_PAPER_A}.trajectories:fig12", ["measurements", "errors", "redraw_errors"]),
 }
 TWIN_FIGURES = {"twin_search": (f"{_PAPER_A}.twin:twin_search", ["twin_progress", "twin_restarts"])}
 TRADEOFF_FIGURES = {"twin_tradeoff": (f"{_PAPER_A}.twin:twin_tradeoff", ["twin_tradeoff"])}
@@ -34,6 +34,17 @@ PAPERS["A"] = {
         ),
     },
 }
+
+
+def twin_settings(state, *keys):
+    """Settings of a job that searches for the twin; state: its file or folder below the results' `twin`."""
+    return {
+        "nominal": parts.nominal(config, REPRODUCED),
+        "virtual": parts.virtual(config, REPRODUCED),
+        "workers": 2,
+        "state": f"{RESULTS}/twin/{state}",
+        **reads(*keys, "twin"),
+    }
 
 
 # all values and seeds of one swept setting in one interpretation of the paper
@@ -111,13 +122,7 @@ rule twin_search:
         f"{RESULTS}/logs/twin.log",
     threads: 2
     params:
-        settings={
-            "nominal": parts.nominal(config, REPRODUCED),
-            "virtual": parts.virtual(config, REPRODUCED),
-            "workers": 2,
-            "state": f"{RESULTS}/twin/state.json",
-            **reads("reproduce.line_calibration", "twin"),
-        },
+        settings=twin_settings("state.json", "reproduce.line_calibration"),
         code=code("twin"),
     script:
         "../../scripts/twin.py"
@@ -130,13 +135,7 @@ rule twin_hypotheses:
         f"{RESULTS}/logs/twin_hypotheses.log",
     threads: 2
     params:
-        settings={
-            "nominal": parts.nominal(config, REPRODUCED),
-            "virtual": parts.virtual(config, REPRODUCED),
-            "workers": 2,
-            "state": f"{RESULTS}/twin/hypotheses",
-            **reads("twin"),
-        },
+        settings=twin_settings("hypotheses"),
         code=code("twin_hypotheses"),
     script:
         "../../scripts/twin_hypotheses.py"
@@ -149,13 +148,7 @@ rule twin_tradeoff:
         f"{RESULTS}/logs/twin_tradeoff.log",
     threads: 2
     params:
-        settings={
-            "nominal": parts.nominal(config, REPRODUCED),
-            "virtual": parts.virtual(config, REPRODUCED),
-            "workers": 2,
-            "state": f"{RESULTS}/twin/tradeoff",
-            **reads("reproduce.line_calibration", "twin"),
-        },
+        settings=twin_settings("tradeoff", "reproduce.line_calibration"),
         code=code("twin_tradeoff"),
     script:
         "../../scripts/twin_tradeoff.py"

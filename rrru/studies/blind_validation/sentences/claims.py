@@ -130,6 +130,7 @@ _READ = {
     "far from the commands": r"measured positions are .* from the commanded ones in the median: .*",
     "not this reflector": r"run \S+ point \S+: .*",
 }
+PATTERNS = _SENTENCES | _NOTES | _READ
 
 
 def claims(page):

@@ -10,7 +10,7 @@ import re
 import numpy as np
 
 from rrru.estimation.intervals import QUANTILE_95
-from rrru.studies.blind_validation.sentences.claims import UNKNOWN
+from rrru.studies.blind_validation.sentences.claims import PATTERNS, UNKNOWN
 
 # tolerance of the mean square of a size, and of a share; number of standard errors
 _NEAR, _NEAR_SHARE, _ERRORS = 0.55, 0.2, 3.0
@@ -37,7 +37,9 @@ _NEIGHBOURS = 10
 
 
 def judge(claim, truth, facts):
-    """True, False or None for a Claim on a page of facts; None, too, for a sentence of an unknown kind."""
+    """True, False or None for a Claim on a page of facts; None where the truth neither confirms nor contradicts it."""
+    if claim.kind in _OF_EVERY_FILE:
+        return _OF_EVERY_FILE[claim.kind]
     if claim.kind not in _JUDGES:
         return None
     found = _JUDGES[claim.kind](claim.stated, truth, facts)
@@ -74,11 +76,6 @@ def _verdict(_stated, truth, facts):
     return _verdict_right(facts, truth) if truth.strength >= STRONG else None
 
 
-def _no_false_name(stated, truth, _facts):
-    """No cause is named that does not act."""
-    return set(stated["names"]) <= set(truth.effects)
-
-
 def _leg(stated, truth, _facts):
     """The named leg or drive is the one at which the cause acts."""
     if truth.strength < STRONG or set(stated["names"]) != set(truth.effects) or not truth.effects:
@@ -102,11 +99,6 @@ def _one_of(names, truth):
 def _group(stated, truth, _facts):
     """One of the causes of a group acts."""
     return _one_of(re.findall(r"([a-z ]+?) (?:more than |less than )?[\d.]+(?:, |$)", stated["listed"]), truth)
-
-
-def _by_its_share(stated, truth, _facts):
-    """A cause of the line of all causes acts, or one of its group."""
-    return _one_of(stated["name"].split(" or "), truth)
 
 
 def _probability_of_cause(stated, truth, _facts):
@@ -147,16 +139,6 @@ def _error(low, high):
     return (float(high) - float(low)) / (2.0 * QUANTILE_95)
 
 
-def _misfit(_stated, _truth, _facts):
-    """These files and robots belong together."""
-    return False
-
-
-def _shares_undetermined(_stated, truth, _facts):
-    """The gap is smaller than the noise."""
-    return truth.before_mm < truth.noise_rms_mm
-
-
 def _unexplained(_stated, truth, _facts):
     """A cause outside the library acts."""
     return truth.outside
@@ -181,11 +163,6 @@ def _rival(stated, truth, _facts):
     return None
 
 
-def _next_nothing(_stated, truth, facts):
-    """No more measurements are needed where the answer is correct."""
-    return _verdict_right(facts, truth)
-
-
 def _zero(stated, truth, _facts):
     """The stated zero offset of a drive, alone or together with the part that it moves."""
     if stated["site"] not in truth.zeros:
@@ -206,11 +183,6 @@ def _zeros_lost(stated, truth, _facts):
     return abs(float(stated["value"]) - true) <= 0.5 * abs(true)
 
 
-def _weight(_stated, _truth, _facts):
-    """These robots are upright and carry the stated mass."""
-    return False
-
-
 def _points(stated, truth, _facts):
     """The file has the stated number of rows."""
     return int(stated["rows"]) in (truth.rows, truth.stops) and int(stated["used"]) <= int(stated["rows"])
@@ -219,16 +191,6 @@ def _points(stated, truth, _facts):
 def _few(stated, truth, _facts):
     """The stated number of readings: three for a position, six for a pose."""
     return int(stated["numbers"]) <= truth.rows * (6 if truth.turned else 3)
-
-
-def _noise_larger(_stated, truth, _facts):
-    """The noise is as stated; only errors outside every model, as those of MuJoCo's servos, make it look larger."""
-    return truth.outside or truth.still_mm > _OWN * truth.noise_rms_mm
-
-
-def _unmeasured_again(_stated, truth, _facts):
-    """No pose was measured twice."""
-    return not truth.again
 
 
 def _needs(stated, _truth, _facts):
@@ -242,24 +204,9 @@ def _needs_different(stated, truth, _facts):
     return False if "time_s" in needs else truth.payloads == 1 if "payload_kg" in needs else None
 
 
-def _absorbed(stated, truth, _facts):
-    """An effect that the calibration absorbs is not the acting and detectable one."""
-    return not (stated["name"] in truth.effects and truth.chi2 > _SEEN)
-
-
-def _file_leaves(stated, truth, _facts):
-    """The corrected file's error at the readings within a tenth."""
-    return _within(stated["value"], truth.file_read_mm)
-
-
 def _within(said, true_mm):
     """Whether an rms agrees with the true one within a tenth."""
     return abs(float(said) / true_mm - 1.0) <= _REMAINDER if np.isfinite(true_mm) else None
-
-
-def _file_worse(stated, truth, _facts):
-    """The residual rms of the given file within a tenth."""
-    return _within(stated["other"], truth.given_read_mm)
 
 
 def _lost(stated, _truth, facts):
@@ -378,19 +325,9 @@ def _reflector(stated, truth, _facts):
     return np.linalg.norm(off) <= _MOST_ERRORS * float(stated["about"])
 
 
-def _outliers(_stated, _truth, _facts):
-    """These files have no corrupted reading."""
-    return False
-
-
 def _missing(stated, _truth, _facts):
     """The files have no such column."""
     return stated["column"] in ("run", "point", "speed_mm_s", "temperature_c")
-
-
-def _registered(stated, truth, _facts):
-    """The stated number of points was read, except a few outliers."""
-    return _MOST_LEFT * truth.rows <= int(stated["points"]) <= truth.rows
 
 
 def _overlap(_stated, _truth, facts):
@@ -416,92 +353,50 @@ def _turned(stated, _truth, _facts):
     return bool(np.radians(float(stated["value"])) <= _NEAR_TURN_RAD)
 
 
-def _undecided(_stated, _truth, _facts):
-    """A sentence that the truth can neither confirm nor contradict."""
-    return None
-
-
-def _true(_stated, _truth, _facts):
-    """A sentence that is true of every file here."""
-    return True
-
-
 _JUDGES = {
     "the robot still misses by": lambda stated, t, _: _sized(stated["value"], t.before_mm, t, t.rows),
     "nothing systematic is left": _none,
     "a cause with a share": _cause,
     "a cause with a size": _cause,
     "a cause without a share": _cause,
-    "no cause is named": _misfit,
-    "what to check": _misfit,
     "the corrected file is worse": lambda stated, t, _: t.file_mm > _AS_GOOD * t.after_mm,
-    "shares are not determined": _shares_undetermined,
-    "the effects are confounded": _undecided,
+    "shares are not determined": lambda _, t, __: t.before_mm < t.noise_rms_mm,
     "shares overlap": _overlap,
     "something is unexplained": _unexplained,
-    "no cause is sure": _undecided,
     "the unexplained follows": _unexplained,
-    "causes by share": _undecided,
-    "a cause by its share": _by_its_share,
+    "a cause by its share": lambda stated, t, _: _one_of(stated["name"].split(" or "), t),
     "a group of causes": _group,
     "probability of a cause": _probability_of_cause,
     "probability of this answer": _probability,
     "it does not repeat": _scatter,
     "it is random error": _scatter,
     "what is left with it": lambda stated, t, _: _sized(stated["value"], t.after_mm, t, t.rows),
-    "these data cannot rule out": _undecided,
     "next, a run": _next_run,
     "next, none is advised": _unexplained,
-    "next, nothing more": _next_nothing,
+    "next, nothing more": lambda _, t, facts: _verdict_right(facts, t),
     "next, nothing would decide": _next_inspection,
-    "next, nothing would settle it": _undecided,
     "a zero is off": _zero,
-    "a zero is confounded": _undecided,
-    "a zero is not determined": _undecided,
-    "a weight is confounded": _undecided,
     "without it a number would be off": lambda stated, t, _: stated["name"] in t.effects,
-    "the mass is not as stated": _weight,
-    "the base is tilted": _weight,
-    "the fit did not converge": _undecided,
     "points used": _points,
     "few readings": _few,
     "fitted without some points": lambda stated, t, _: int(stated["lacking"]) < int(stated["used"]) <= t.rows,
-    "the noise is larger": _noise_larger,
-    "the noise is smaller": lambda *_: False,
-    "a noise of zero was stated": lambda *_: False,
-    "repeatability is unknown": _unmeasured_again,
+    # only errors outside every model, as those of MuJoCo's servos, make it look larger
+    "the noise is larger": lambda _, t, __: t.outside or t.still_mm > _OWN * t.noise_rms_mm,
+    "repeatability is unknown": lambda _, t, __: not t.again,
     "an effect needs what is not there": _needs,
     "an effect needs different values": _needs_different,
     "an effect is a calibration's number": lambda stated, t, _: stated["name"] not in t.effects,
-    "an effect is absorbed": _absorbed,
-    "masses are unknown": _undecided,
-    "an effect is not tested": _undecided,
-    "runs are limited": _undecided,
-    "the file leaves": _file_leaves,
-    "the file would be worse": _file_worse,
-    "the file is not corrected": _undecided,
-    "how the file was driven": _undecided,
-    "a part of a sentence": _undecided,
+    "an effect is absorbed": lambda stated, t, _: not (stated["name"] in t.effects and t.chi2 > _SEEN),
+    "the file leaves": lambda stated, t, _: _within(stated["value"], t.file_read_mm),
+    "the file would be worse": lambda stated, t, _: _within(stated["other"], t.given_read_mm),
     "the file cannot hold play": _lost_kind("backlash"),
     "the file cannot hold compliance": _lost_kind("drive_compliance"),
     "the file cannot hold an effect": _lost,
-    "no commanded positions": _true,
     "no such column": _missing,
-    "registered": _registered,
+    "registered": lambda stated, t, _: _MOST_LEFT * t.rows <= int(stated["points"]) <= t.rows,
     "a reflector was found": _reflector,
-    "a reflector is assumed": _undecided,
     "orientations are turned": _turned,
     "zeros are lost": _zeros_lost,
-    "far from ordinary errors": _outliers,
-    "points are outliers": _outliers,
-    "jumps are frequent": _undecided,
-    "rows without a pose": _undecided,
-    "stale readings": _outliers,
-    "undeclared columns": _outliers,
-    "beyond a range": _outliers,
-    "rows may be shifted": _outliers,
-    "far from the commands": _outliers,
-    "not this reflector": _outliers,
     "place of a cause": _place,
     "size of a cause": _size_of_cause,
     "share of a cause": _share_of_cause,
@@ -509,7 +404,7 @@ _JUDGES = {
     "a rival": _rival,
     "the measuring noise": _noise,
     "verdict": _verdict,
-    "names in the verdict": _no_false_name,
+    "names in the verdict": lambda stated, t, _: set(stated["names"]) <= set(t.effects),
     "leg of the verdict": _leg,
     "gap_rms_mm": lambda stated, t, _: _sized(stated["value"], t.before_mm, t, t.rows),
     "noise_rms_mm": _noise,
@@ -517,7 +412,6 @@ _JUDGES = {
     "gap_after_rms_mm": lambda stated, t, _: _sized(stated["value"], t.after_mm, t, t.rows),
     "interval of share_closed": _closed,
     **{f"interval of a share: {kind}": _budget for kind in ("effect", "unexplained", "scatter", "runs")},
-    **{f"interval of a share: {kind}": _undecided for kind in ("covariance", "sampling", "calibration")},
     "interval of a share: by direction": _by_factor,
     "interval of a share: by payload": _by_factor,
     **{f"interval of a number: {kind}": _number for kind in ("calibration", "cause", "weight")},
@@ -528,4 +422,26 @@ _JUDGES = {
     "corrected_drives bring it there": _drives,
     "detectable_mm": _detectable,
 }
-KINDS = (*_JUDGES, UNKNOWN)
+# what is true, or false, of every file here: readings are sound, and robots are upright and carry the stated mass
+_OF_EVERY_FILE = {"no commanded positions": True} | dict.fromkeys(
+    (
+        "no cause is named",
+        "what to check",
+        "the mass is not as stated",
+        "the base is tilted",
+        "the noise is smaller",
+        "a noise of zero was stated",
+        "far from ordinary errors",
+        "points are outliers",
+        "stale readings",
+        "undeclared columns",
+        "beyond a range",
+        "rows may be shifted",
+        "far from the commands",
+        "not this reflector",
+    ),
+    False,
+)
+# parts of the budget whose shares the truth does not have
+_NO_TRUE_SHARE = ("covariance", "sampling", "calibration")
+KINDS = {*PATTERNS, *_JUDGES, *(f"interval of a share: {kind}" for kind in _NO_TRUE_SHARE), UNKNOWN}

@@ -97,18 +97,9 @@ def _chain(generator, name):
         ends = np.array(span) * (scale if unit == "mm" else 1.0) * generator.uniform(0.9, 1.0)
         turned = (np.pi, 0.0, 0.0) if name == "arm6_hanging" and number == 1 else (0.0, 0.0, 0.0)
         centre = 60.0 * generator.uniform(-1.0, 1.0, 3)
-        joints.append(
-            Joint(
-                f"q{number}",
-                unit,
-                _AXES[letter.lower()],
-                tuple(place.tolist()),
-                tuple(ends.tolist()),
-                turned,
-                float(mass * generator.uniform(0.7, 1.4)),
-                tuple(centre.tolist()),
-            )
-        )
+        weighed = float(mass * generator.uniform(0.7, 1.4)), tuple(centre.tolist())
+        way = _AXES[letter.lower()], tuple(place.tolist()), tuple(ends.tolist()), turned
+        joints.append(Joint(f"q{number}", unit, *way, *weighed))
     tip = scale * np.array(tip_mm) + generator.uniform(-10.0, 10.0, 3)
     return Chain(tuple(joints), tuple(tip.tolist()))
 
@@ -156,28 +147,16 @@ def _hexaglide(generator):
     size = generator.uniform(0.8, 1.2)
     foot = _circle(400.0 * size, _pairs(generator, 18.0), 200.0) + generator.uniform(-10.0, 10.0, (6, 3))
     head = _circle(130.0 * size, _pairs(generator, 42.0), 0.0)
-    home = np.array([0.0, 0.0, 200.0 + 420.0 * size])
-    return Rods(
-        "rail",
-        tuple(range(6)),
-        foot,
-        _along(_Z),
-        foot,
-        head,
-        home,
-        _symmetric(45 * size),
-        _masses(generator, (3, 2, 0.4)),
-    )
+    home, masses = np.array([0.0, 0.0, 200.0 + 420.0 * size]), _masses(generator, (3, 2, 0.4))
+    return Rods("rail", tuple(range(6)), foot, _along(_Z), foot, head, home, _symmetric(45 * size), masses)
 
 
 def _delta_rails(generator):
     """A delta on three vertical rails."""
     size, drive = generator.uniform(0.8, 1.3), (0, 0, 1, 1, 2, 2)
     foot, head = _rod_pairs(240.0 * size, 60.0 * size, 45.0 * size)
-    home = np.array([0.0, 0.0, -380.0 * size])
-    return Rods(
-        "rail", drive, foot, _along(_Z), foot, head, home, _symmetric(90 * size), _masses(generator, (1, 1, 0.2))
-    )
+    home, masses = np.array([0.0, 0.0, -380.0 * size]), _masses(generator, (1, 1, 0.2))
+    return Rods("rail", drive, foot, _along(_Z), foot, head, home, _symmetric(90 * size), masses)
 
 
 def _rod_pairs(outer_mm, inner_mm, half_mm):
@@ -196,19 +175,9 @@ def _delta(generator):
     foot, head = _rod_pairs(base + arm, 60.0 * size, 45.0 * size)
     pivot, _ = _rod_pairs(base, 60.0 * size, 45.0 * size)
     side = (foot[1::2] - foot[::2]) / np.linalg.norm(foot[1] - foot[0])
-    home = np.array([0.0, 0.0, -620.0 * size])
+    home, side = np.array([0.0, 0.0, -620.0 * size]), np.repeat(side, 2, axis=0)
     pivot = np.repeat(0.5 * (pivot[::2] + pivot[1::2]), 2, axis=0)
-    return Rods(
-        "crank",
-        drive,
-        foot,
-        np.repeat(side, 2, axis=0),
-        pivot,
-        head,
-        home,
-        _symmetric(0.35),
-        _masses(generator, (1, 1, 0.2)),
-    )
+    return Rods("crank", drive, foot, side, pivot, head, home, _symmetric(0.35), _masses(generator, (1, 1, 0.2)))
 
 
 def _hexa(generator):

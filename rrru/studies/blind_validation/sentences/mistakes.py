@@ -6,6 +6,7 @@ instrument is registered rigidly where its frame is not stated. Otherwise the fi
 
 import re
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -35,11 +36,11 @@ class Handed:
     places: dict
 
 
-def _right(own, section):
+def _right(own):
     """The correct file."""
     exact = own.readings(own.poses())
     rows = own.table(exact, True)[np.repeat(~own.stops.fresh, len(own.targets))]
-    return Handed(rows, section, own.nominal, (), own.targets)
+    return Handed(rows, own.section(".", "stops.csv"), own.nominal, (), own.targets)
 
 
 def _signs(handed, own, names):
@@ -102,11 +103,6 @@ def _late(handed, own, _generator, by=1):
     # the values of a row are `by` rows below it
     rows = handed.rows.assign(**{name: moved[name] for name in names}).iloc[by:]
     return replace(handed, rows=rows, words=(rf"not {by} rows? late|rows may be shifted",))
-
-
-def _late_by_two(handed, own, generator):
-    """Measured columns are shifted down by two rows."""
-    return _late(handed, own, generator, 2)
 
 
 def _tool(handed, own, _generator):
@@ -183,7 +179,7 @@ MISTAKES = {
     "drives in reverse": _reversed,
     "drives moved on": _moved_on,
     "rows late by one": _late,
-    "rows late by two": _late_by_two,
+    "rows late by two": partial(_late, by=2),
     "tool": _tool,
     "place of a target": _one_target,
     "targets exchanged": _targets_exchanged,
@@ -204,7 +200,7 @@ def with_mistake(number, seed, most_stops):
     while True:
         own = right_draw(len(MISTAKES) * (turn * 97 + step) + number % len(MISTAKES), seed, most_stops, "mistakes")
         generator = stream(seed, "sentences mistake", number, step)
-        handed = MISTAKES[name](_right(own, own.section(".", "stops.csv")), own, generator)
+        handed = MISTAKES[name](_right(own), own, generator)
         if handed is not None:
             return name, own, handed
         step += 1
@@ -218,15 +214,14 @@ def right_draw(number, seed, most_stops, label):
 def right_file(number, seed, most_stops):
     """The Draw of a correct file, and what is Handed in."""
     own = right_draw(number, seed, most_stops, "right files")
-    return own, _right(own, own.section(".", "stops.csv"))
+    return own, _right(own)
 
 
 def shows(name, own, handed):
     """Whether a mistake is detectable in the file."""
     if name in _OF_FRAME:
         return True
-    right = _right(own, own.section(".", "stops.csv"))
-    return _rms(handed, own) > _SHOWS * _rms(right, own)
+    return _rms(handed, own) > _SHOWS * _rms(_right(own), own)
 
 
 def _rms(handed, own):
