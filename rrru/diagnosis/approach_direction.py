@@ -118,32 +118,32 @@ def _reversals(path, width):
     return result
 
 
-def estimate_approach(case, state, responses):
-    """The motion's `approach` (n, K) by what a state leaves of a Case's readings.
+def estimate_approach(problem, state, responses):
+    """The motion's `approach` (n, K) by what a state leaves of a problem's readings.
 
     Both senses of every drive have equal prior probability. The combinations of the senses at a stop have the odds of
     the likelihood of all that was read there; the expected sense is their mean.
     responses (m, 3, K): change of what is read by a sense of 1 of each drive.
     """
-    approach = case.motion.approach.copy()
+    approach = problem.motion.approach.copy()
     unknown = np.isfinite(approach)
     # the residual under even odds
-    plain = replace(case, motion=replace(case.motion, approach=np.where(unknown, 0.0, approach)))
-    scale = case.axis_mm
+    plain = replace(problem, motion=replace(problem.motion, approach=np.where(unknown, 0.0, approach)))
+    scale = problem.axis_mm
     left, response = plain.residual(state) / scale, responses / scale[:, None]
     size = np.sqrt((response**2).sum(axis=1)) > OPTIONS.min_approach_response_per_noise
     approach[unknown] = 0.0
-    acting = (unknown[case.at] & size).any(axis=1)
-    for stop in np.unique(case.stop[acting]):
-        here = case.stop == stop
-        drives = np.flatnonzero((unknown[case.at[here]] & size[here]).any(axis=0))
+    acting = (unknown[problem.at] & size).any(axis=1)
+    for stop in np.unique(problem.stop[acting]):
+        here = problem.stop == stop
+        drives = np.flatnonzero((unknown[problem.at[here]] & size[here]).any(axis=0))
         power = (response[here][..., drives] ** 2).sum(axis=(0, 1))
         drives = np.sort(drives[np.argsort(-power, kind="stable")][: OPTIONS.max_jointly_estimated_drives])
         senses = np.array([*product((-1.0, 1.0), repeat=len(drives))])
         lacking = left[here].ravel() - senses @ response[here].reshape(-1, response.shape[-1])[:, drives].T
         log = -0.5 * (lacking**2).sum(axis=1)
         odds = np.exp(log - np.logaddexp.reduce(log))
-        points = np.unique(case.at[here])
+        points = np.unique(problem.at[here])
         approach[points[:, None], drives] = np.where(unknown[points[:, None], drives], odds @ senses, np.nan)
     return approach
 

@@ -24,9 +24,9 @@ def budget(inference, stated_mm, generator, draws):
     """Rows of `gap_budget` without the campaign; stated_mm: the instrument's noise per axis, None where unknown."""
     squares, products, fitted = _drawn(inference, generator, draws)
     noise = _noise_parts(inference, stated_mm, generator, draws)
-    residual = inference.case.residual(inference.calibrated)
+    residual = inference.problem.residual(inference.calibrated)
     instrument = float(noise.pop("instrument").mean())
-    gap = float((residual[inference.case.on_robot] ** 2).sum(axis=1).mean()) - instrument
+    gap = float((residual[inference.problem.on_robot] ** 2).sum(axis=1).mean()) - instrument
     posterior = inference.posterior
     unexplained = squares.pop(_UNEXPLAINED)
     rows = [(name, "effect", drawn, posterior.marginal(name)) for name, drawn in squares.items()]
@@ -55,13 +55,13 @@ def _drawn(inference, generator, draws):
     """Draws (b,) of mean squares, of effects and of what is unexplained, by name, and of products of two of them; the
     share of the noise that the calibration absorbs.
     """
-    case, evidence, posterior = inference.case, inference.evidence, inference.posterior
+    problem, evidence, posterior = inference.problem, inference.evidence, inference.posterior
     linear = evidence.linear
-    left = _LeftByCalibration(linear.base, case.on_robot)
-    data, count = left.residual(linear.data.reshape(-1, 1)), int(case.on_robot.sum())
+    left = _LeftByCalibration(linear.base, problem.on_robot)
+    data, count = left.residual(linear.data.reshape(-1, 1)), int(problem.on_robot.sum())
     weights = posterior.weights.ravel()
     counts = np.bincount(generator.choice(len(weights), draws, p=weights / weights.sum()), minlength=len(weights))
-    names = [name for name in case.effects if posterior.marginal(name) > OPTIONS.min_budget_probability]
+    names = [name for name in problem.effects if posterior.marginal(name) > OPTIONS.min_budget_probability]
     squares = {name: np.zeros(draws) for name in (*names, _UNEXPLAINED)}
     products, first = {pair: np.zeros(draws) for pair in combinations(squares, 2)}, 0
     for number in np.flatnonzero(counts):
@@ -76,7 +76,7 @@ def _drawn(inference, generator, draws):
                 products[pair][some] = 2.0 * (parts[pair[0]] * parts[pair[1]]).sum(axis=0) / count
         if posterior.unexplained[row, level] and _UNEXPLAINED not in parts:
             beyond = data - sum(parts.values(), np.zeros((len(data), counts[number])))
-            spare = 3.0 * case.noise_mm**2 * (1.0 - left.taken)
+            spare = 3.0 * problem.noise_mm**2 * (1.0 - left.taken)
             squares[_UNEXPLAINED][some] = np.maximum((beyond**2).sum(axis=0) / count - spare, 0.0)
     return squares, products, left.taken
 
@@ -132,9 +132,9 @@ def _parts(evidence, hypothesis, level, left, generator, count):
 
 def _noise_parts(inference, stated_mm, generator, draws):
     """Draws (b,) of the instrument's mean square, and draws and probability of scatter and runs."""
-    case = inference.case
-    model = case.noise or NoiseModel.white(case.noise_mm)
-    freedom = max(len(case) - inference.evidence.linear.base.shape[-1], 1)
+    problem = inference.problem
+    model = problem.noise or NoiseModel.white(problem.noise_mm)
+    freedom = max(len(problem) - inference.evidence.linear.base.shape[-1], 1)
     axes = model.axis_mm**2 * (1.0 + np.sqrt(2.0 / freedom) * generator.standard_normal((draws, 3)))
     scatter, probability = np.zeros((draws, 3)), np.nan
     if stated_mm:

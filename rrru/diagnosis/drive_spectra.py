@@ -23,7 +23,7 @@ from scipy.special import gammaln
 
 from rrru.diagnosis.discrepancy_basis import UNKNOWN
 from rrru.diagnosis.options import OPTIONS
-from rrru.diagnosis.state import State
+from rrru.diagnosis.state import ModelState
 from rrru.diagnosis.terms import signatures
 from rrru.effects.harmonic import drives_of, waves
 
@@ -33,15 +33,15 @@ _PLACES = 721
 _LEAST_POWER = 1e-10
 
 
-def with_spectra(case, linear, terms):
-    """The case whose waves are found and whose spectra are chosen, of effects that no term holds; and keys of these.
+def with_spectra(problem, linear, terms):
+    """The problem whose waves are found and whose spectra are chosen, of effects that no term holds; and keys of these.
 
     linear: about the state of a hypothesis, whose terms are fitted together with them.
     """
-    library, held = dict(case.library), {term.effect for term in terms}
+    library, held = dict(problem.library), {term.effect for term in terms}
     open_ones = [e for e in library.values() if (e.coordinates.roots or _is_pending(e)) and e.name not in held]
     if not open_ones:
-        return case, []
+        return problem, []
     # a rough function of the drives' values contains all harmonics: together with it none would be left
     known = [term for term in terms if term.effect not in UNKNOWN and not library[term.effect].coordinates.broad]
     nuisance = np.concatenate([linear.base, *signatures(library, linear, known)], axis=-1)
@@ -50,7 +50,7 @@ def with_spectra(case, linear, terms):
     changed = []
     for effect in open_ones:
         if _is_pending(effect):
-            found = pursue(data, basis, linear.drive, case.motion.drive[case.at])
+            found = pursue(data, basis, linear.drive, problem.motion.drive[problem.at])
             if found[0]:
                 library[effect.name] = effect.with_waves(*found)
                 changed.append((effect.name, 0))
@@ -63,7 +63,7 @@ def with_spectra(case, linear, terms):
         best, prior_scale, noise = likeliest(data, _without(columns, basis), (roots, of_one), basis.shape[1])
         library[effect.name] = _chosen(effect, _visible(columns, roots[best], prior_scale / noise), prior_scale)
         changed.append((effect.name, 0))
-    return replace(case, library=library), changed
+    return replace(problem, library=library), changed
 
 
 def _is_pending(effect):
@@ -148,14 +148,14 @@ def _unit(columns, least):
     return columns / np.where(norm > least, norm, np.inf)
 
 
-def amplitudes(case, state, orders):
+def amplitudes(problem, state, orders):
     """Amplitudes (K, g) in rad of waves of orders (g,) of each drive that fit what a state leaves, one at a time.
 
     The calibration's parameters are fitted together with each; NaN where they absorb more than 99 % of a wave.
     """
-    linear, drive = case.linearise(State(state.deviations, {}), []), case.motion.drive[case.at]
+    linear, drive = problem.linearise(ModelState(state.deviations, {}), []), problem.motion.drive[problem.at]
     basis, _ = np.linalg.qr(linear.base.reshape(linear.data.size, -1))
-    left, result = case.residual(state).ravel(), np.full((drive.shape[1], len(orders)), np.nan)
+    left, result = problem.residual(state).ravel(), np.full((drive.shape[1], len(orders)), np.nan)
     for k, found in enumerate(result):
         whole = _waves_of(linear.drive, drive, k, orders)
         columns = _without(whole, basis)
@@ -347,30 +347,30 @@ def periodogram(data, drive_effect, drive, nuisance, orders):
     return gains
 
 
-def with_orders(case, linear, terms):
-    """The case whose searched effects have the orders that stand out as more shapes, and keys of these (effect, shape).
+def with_orders(problem, linear, terms):
+    """The problem whose searched effects have the outstanding orders as more shapes, and keys of these (effect, shape).
 
     linear: about the state of a hypothesis, whose terms are fitted together with the harmonics.
     """
-    library, added = dict(case.library), []
+    library, added = dict(problem.library), []
     # a rough function of the drives' values contains all harmonics
-    broad = any(case.library[term.effect].coordinates.broad for term in terms)
-    for name, effect in case.library.items():
+    broad = any(problem.library[term.effect].coordinates.broad for term in terms)
+    for name, effect in problem.library.items():
         if effect.coordinates.searched is not None and not broad:
             # a discrepancy function would absorb what is searched for
             others = [term for term in terms if term.effect != name and term.effect not in UNKNOWN]
-            library[name] = _found(case, linear, effect, others)
+            library[name] = _found(problem, linear, effect, others)
             new = range(len(effect.coordinates.shapes), len(library[name].coordinates.shapes))
             added += [(name, shape) for shape in new]
-    return replace(case, library=library), added
+    return replace(problem, library=library), added
 
 
-def _found(case, linear, effect, others):
+def _found(problem, linear, effect, others):
     """An effect with the orders that stand out added to its shapes."""
     coordinates, search = effect.coordinates, effect.coordinates.searched
-    drives = drives_of(case.mechanism, search.unit)
-    drive, step = case.motion.drive[:, drives][case.at], resolution(case.motion.drive[:, drives][case.used])
-    nuisance = np.concatenate([linear.base, *signatures(case.library, linear, others)], axis=-1)
+    drives = drives_of(problem.mechanism, search.unit)
+    drive, step = problem.motion.drive[:, drives][problem.at], resolution(problem.motion.drive[:, drives][problem.used])
+    nuisance = np.concatenate([linear.base, *signatures(problem.library, linear, others)], axis=-1)
     orders = np.arange(step, search.highest, step / OPTIONS.orders_per_resolution)
     if len(orders) < 3 or nuisance.shape[-1] > linear.data.size // 2:
         return effect

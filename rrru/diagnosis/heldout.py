@@ -10,7 +10,7 @@ from scipy.linalg import cho_solve, solve_triangular
 from rrru.campaign.noise import along_runs
 from rrru.diagnosis.evidence import ModelEvidence
 from rrru.diagnosis.options import OPTIONS
-from rrru.diagnosis.problem import Case
+from rrru.diagnosis.problem import DiagnosisProblem
 from rrru.diagnosis.terms import signatures
 from rrru.diagnosis.whitened import discrepancy_scales, spectrum
 from rrru.estimation.cross_validation import choose_folds, complement_fits
@@ -62,9 +62,9 @@ def _log_score(residual, variance):
 
 @dataclass(frozen=True)
 class HeldOut:
-    """Predictions of every used reading of a case from those of the other folds, on one linearisation."""
+    """Predictions of every used reading of a problem from those of the other folds, on one linearisation."""
 
-    case: Case
+    problem: DiagnosisProblem
     evidence: ModelEvidence
 
     @cached_property
@@ -75,15 +75,15 @@ class HeldOut:
         run of a kind would require extrapolation, which says nothing about the effect. Where one fold alone determines
         a parameter, as of a target that was seen at a few stops, every fifth stop.
         """
-        white = self.evidence.linear.base / self.case.noise_mm
+        white = self.evidence.linear.base / self.problem.noise_mm
         return choose_folds(self._candidates(), white)
 
     def _candidates(self):
         """Fold numbers (m,), the most demanding ones first."""
-        frame, run = self.case.points, self.case.run
+        frame, run = self.problem.points, self.problem.run
         if (frame.groupby("trajectory")["run"].nunique() > 1).all():
             yield np.unique(run, return_inverse=True)[1] % OPTIONS.max_run_folds
-        place = within(run, self.case.stop)
+        place = within(run, self.problem.stop)
         for length in (OPTIONS.points_per_stretch, 1):
             yield np.unique((place // length + run) % OPTIONS.stretch_folds, return_inverse=True)[1]
 
@@ -101,7 +101,7 @@ class HeldOut:
             residual[out] = linear.data[out] - together[out] @ fit.mean
             if uncertain:
                 spread[out] = fit.half(together[out].reshape(-1, len(fit.mean))).T.reshape(-1, 3, len(fit.mean))
-        return Prediction(residual, spread, self._left(level), self.case.series if self._whole_runs else None)
+        return Prediction(residual, spread, self._left(level), self.problem.series if self._whole_runs else None)
 
     def gains(self, terms, prior_scales, level):
         """Log predictive score that each of the terms adds to that of the others, at these prior scales.
@@ -135,7 +135,7 @@ class HeldOut:
         evidence = self.evidence.on_complete(terms)
         if evidence is self.evidence:
             return self
-        return HeldOut(self.case.at_complete({term.effect for term in terms}), evidence)
+        return HeldOut(self.problem.at_complete({term.effect for term in terms}), evidence)
 
     def _blocks(self, terms):
         """Columns (n, 3, k) of the calibration and of each term."""
@@ -151,19 +151,19 @@ class HeldOut:
         moment[:count] = np.where(np.isfinite(sd), mean, 0.0) * precision[:count]
         together = np.concatenate([*self._blocks(terms), linear.data[..., None]], axis=-1)
         if self._whole_runs:
-            together, _ = along_runs(together, self.case.series)
+            together, _ = along_runs(together, self.problem.series)
         white = together / np.sqrt(self._left(level))[..., None]
         return complement_fits(white, self.fold, precision, moment)
 
     @cached_property
     def _whole_runs(self):
         """Whether every fold is of whole runs."""
-        run = self.case.series
+        run = self.problem.series
         return all(len(np.unique(self.fold[run == label])) == 1 for label in np.unique(run))
 
     def _left(self, level):
         """Variance (n, 3) of noise and discrepancy, along the runs' cosines where folds are whole runs."""
-        noise, series = self.evidence.noise, self.case.series
+        noise, series = self.evidence.noise, self.problem.series
         misfit = (noise.mean_mm * discrepancy_scales(noise)[level]) ** 2
         if not self._whole_runs:
             size = noise.axis_mm**2 * (1.0 + noise.offset) + misfit
@@ -180,11 +180,11 @@ def within(run, at):
     return result
 
 
-def resampled_rows(case, generator, draws):
-    """Rows (draws, m) of a case resampled by runs, or by stretches of five points where there are few runs."""
-    block = run = case.run
+def resampled_rows(problem, generator, draws):
+    """Rows (draws, m) of a problem resampled by runs, or by stretches of five points where there are few runs."""
+    block = run = problem.run
     if len(np.unique(run)) < OPTIONS.min_resampled_runs:
-        block = run * (len(run) + 1) + within(run, case.stop) // OPTIONS.points_per_stretch
+        block = run * (len(run) + 1) + within(run, problem.stop) // OPTIONS.points_per_stretch
     groups = [np.flatnonzero(block == label) for label in dict.fromkeys(block.tolist())]
     result = np.empty((draws, len(run)), dtype=int)
     for k in range(draws):

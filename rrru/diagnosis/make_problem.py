@@ -1,4 +1,4 @@
-"""Make the case of a campaign: its motion, the used points, the effects that they can test and at which of them.
+"""Make the problem of a campaign: its motion, the used points, the effects that they can test and at which of them.
 
 Lengths in mm, angles in rad.
 """
@@ -24,7 +24,7 @@ from rrru.diagnosis.discrepancy_basis import unknown_functions
 from rrru.diagnosis.drive_spectra import resolved
 from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.payload_nuisance import nuisance_priors
-from rrru.diagnosis.problem import Case
+from rrru.diagnosis.problem import DiagnosisProblem
 from rrru.effects.motion import Course, make_motion
 from rrru.effects.protocol import LOADS, PATH, complete_rows, known_values
 from rrru.errors import FitError
@@ -37,12 +37,14 @@ UNLOADED = "needs a load of the parts that deflect, and neither a stated mass no
 _USABLE = "allowed: measured points within reach that are no outliers"
 
 
-def make_case(measurements, mechanism, masses, noise_mm, library, use_near_singularity=True, arm_mm=np.nan):
-    """The case of a measurement table.
+def make_diagnosis_problem(
+    measurements, mechanism, masses, noise_mm, library, use_near_singularity=True, arm_mm=np.nan
+):
+    """The DiagnosisProblem of a measurement table.
 
     Every point is used that was measured, is no outlier and can be reached. Effects whose needs the motion meets
-    nowhere are set aside with the reason; `Case.known` has the points at which the others have all that they need.
-    Raises FitError for an empty table.
+    nowhere are set aside with the reason; `DiagnosisProblem.known` has the points at which the others have all that
+    they need. Raises FitError for an empty table.
     """
     if not len(measurements):
         raise FitError("the campaign has no points; allowed: at least one row: check the file of measurements")
@@ -65,7 +67,7 @@ def make_case(measurements, mechanism, masses, noise_mm, library, use_near_singu
     nuisance_sd, bounds = nuisance_priors(motion, masses)
     more = {"motion_at": motion_at, "known": known, "nuisance_sd": nuisance_sd, "bounds": bounds}
     more["massless"] = _lacks_masses(mechanism, masses)
-    return Case(mechanism, measurements, motion, used, testable, untestable, *sizes, **more)
+    return DiagnosisProblem(mechanism, measurements, motion, used, testable, untestable, *sizes, **more)
 
 
 def _lacks_masses(mechanism, masses):

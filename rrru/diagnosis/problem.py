@@ -31,7 +31,7 @@ GEOMETRY = "geometry"
 
 
 @dataclass(frozen=True)
-class Case:
+class DiagnosisProblem:
     """Points of a campaign, all N of them, of which the used ones are fitted.
 
     What was read at them makes m rows of three numbers in mm: positions, and after them orientations at their arm.
@@ -168,7 +168,7 @@ class Case:
         return result
 
     def under(self, noise):
-        """The case under a NoiseModel."""
+        """The problem under a NoiseModel."""
         return replace(self, noise=noise, noise_mm=noise.mean_mm)
 
     def evidence(self, linear):
@@ -184,12 +184,12 @@ class Case:
         return np.all([np.ones(len(self), dtype=bool), *needed], axis=0)
 
     def at_complete(self, effects):
-        """The case of the points alone at which the campaign has all that some effects need."""
+        """The problem of the points alone at which the campaign has all that some effects need."""
         rows = self.complete(effects)
         return self if rows.all() else self.without(~rows)
 
     def with_approach(self, state):
-        """The case with the senses in which the drives arrive, as a state and the readings determine them."""
+        """The problem with the senses in which the drives arrive, as a state and the readings determine them."""
         if not np.isfinite(self.motion.approach).any():
             return self
         approach = np.where(np.isfinite(self.motion.approach), 0.0, np.nan)
@@ -203,7 +203,7 @@ class Case:
         return np.full(3, self.noise_mm) if self.noise is None else self.noise.axis_mm
 
     def standing(self, state):
-        """The case with the loads where the robot of a state stands, if its platform can turn.
+        """The problem with the loads where the robot of a state stands, if its platform can turn.
 
         Where positions alone were read, the orientation of the platform is not identifiable and does not count.
         Derivatives of the loads by payload and tilt stay as they were: a sag changes them by a share of itself.
@@ -215,7 +215,7 @@ class Case:
         return replace(self, motion=replace(self.motion_at(at), **same))
 
     def without(self, dropped):
-        """The case without the used points of the rows flagged in (m,)."""
+        """The problem without the used points of the rows flagged in (m,)."""
         used = self.used.copy()
         used[self.at[dropped]] = False
         return replace(self, used=used)

@@ -45,18 +45,18 @@ def remainder_rows(inference):
     explained: share of the mean square, noise taken off, that is predicted at left-out points, 0 to 1; scale: distance
     over which the function changes, in the unit of its variable, NaN for steps; rms_mm: of the prediction.
     """
-    case = inference.case
-    rows = case.on_robot
+    problem = inference.problem
+    rows = problem.on_robot
     linear = inference.evidence.linear
     # a fit with a smooth discrepancy leaves to that what the calibration could absorb
-    left, drive = _without_calibration(case.residual(inference.state), linear, rows), linear.drive[rows]
-    stretch = within(case.run, case.stop) // OPTIONS.points_per_stretch + case.run
+    left, drive = _without_calibration(problem.residual(inference.state), linear, rows), linear.drive[rows]
+    stretch = within(problem.run, problem.stop) // OPTIONS.points_per_stretch + problem.run
     fold = (stretch % OPTIONS.stretch_folds)[rows]
-    beyond = (left**2).sum() - left.size * case.noise_mm**2
+    beyond = (left**2).sum() - left.size * problem.noise_mm**2
     result = []
-    for variable in _variables(case, rows) if beyond > 0.0 else ():
-        predicted, scale = _predicted(variable, left, drive, fold, case.noise_mm)
-        explained = 1.0 - (((left - predicted) ** 2).sum() - left.size * case.noise_mm**2) / beyond
+    for variable in _variables(problem, rows) if beyond > 0.0 else ():
+        predicted, scale = _predicted(variable, left, drive, fold, problem.noise_mm)
+        explained = 1.0 - (((left - predicted) ** 2).sum() - left.size * problem.noise_mm**2) / beyond
         rms = float(np.sqrt((predicted**2).sum(axis=1).mean()))
         result.append((variable.follows, float(np.clip(explained, 0.0, 1.0)), scale, variable.unit, rms))
     result.sort(key=lambda row: -row[1])
@@ -74,9 +74,9 @@ def followed_alike(inference, rows, names):
     best = rows.iloc[0] if len(rows) else None
     if best is None or best["explained"] < OPTIONS.min_followed_share:
         return (), 0.0
-    case, linear, state = inference.case, inference.evidence.linear, inference.state
-    on_robot = case.on_robot
-    variable = next(one for one in _variables(case, on_robot) if one.follows == best["follows"])
+    problem, linear, state = inference.problem, inference.evidence.linear, inference.state
+    on_robot = problem.on_robot
+    variable = next(one for one in _variables(problem, on_robot) if one.follows == best["follows"])
     scaled = dict(_functions(variable))
     functions = scaled[best["scale"]] if best["scale"] in scaled else next(iter(scaled.values()))
     design = _design(variable, functions, linear.drive[on_robot]).reshape(3 * int(on_robot.sum()), -1)
@@ -86,7 +86,7 @@ def followed_alike(inference, rows, names):
         fitted = design @ np.linalg.lstsq(design, part, rcond=1e-3)[0]
         if (
             key[0] in names
-            and _depends_on(case.effects[key[0]], best["follows"])
+            and _depends_on(problem.effects[key[0]], best["follows"])
             and ((part - fitted) ** 2).sum() < (1.0 - OPTIONS.min_followed_share) * (part**2).sum()
         ):
             found.append(key[0])
@@ -107,10 +107,10 @@ def _depends_on(effect, follows):
     return "time_s" in effect.needs if follows == "the time" else not effect.needs
 
 
-def _variables(case, rows):
-    """The variables that may be followed at some rows (m,) of a case, those that do not change left out."""
-    motion, at = case.motion, case.at[rows]
-    words, units = drive_words(case.mechanism), case.mechanism.parts.units
+def _variables(problem, rows):
+    """The variables that may be followed at some rows (m,) of a problem, those that do not change left out."""
+    motion, at = problem.motion, problem.at[rows]
+    words, units = drive_words(problem.mechanism), problem.mechanism.parts.units
     names = words.all_names
     found = [
         _Variable(f"the value of {name}", motion.drive[at, k : k + 1], unit, k)
@@ -119,7 +119,7 @@ def _variables(case, rows):
     found.append(_Variable("the place", motion.position_mm[at], "mm"))
     found.append(_Variable("the time", motion.time_s[at][:, None], "s"))
     found.append(_Variable("the payload", motion.payload_kg[at][:, None], "kg"))
-    speed = case.points["speed_mm_s"].to_numpy(dtype=float)[rows]
+    speed = problem.points["speed_mm_s"].to_numpy(dtype=float)[rows]
     found.append(_Variable("the speed", speed[:, None], "mm/s"))
     sense = np.sign(np.where(np.abs(motion.drive_rate[at]) > OPTIONS.min_drive_rate, motion.drive_rate[at], 0.0))
     found.append(_Variable("the sense of motion of the drives", sense, "1", steps=True))

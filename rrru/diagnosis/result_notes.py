@@ -94,10 +94,10 @@ def undetermined_payload_notes(inference):
             yield f"{what} and a compliance are not separately identifiable from these readings: {do}"
 
 
-def mass_notes(case):
+def mass_notes(problem):
     """The sentence that loads are not known, where an effect needs them and the links of the robot have no masses."""
-    untested = {name for name, why in case.untestable.items() if why == UNLOADED}
-    if case.massless and (untested or any(is_compliance(effect) for effect in case.effects.values())):
+    untested = {name for name, why in problem.untestable.items() if why == UNLOADED}
+    if problem.massless and (untested or any(is_compliance(effect) for effect in problem.effects.values())):
         yield MASSES_UNKNOWN
 
 
@@ -107,39 +107,39 @@ def _significant_nuisance(inference):
     With one load all deflections are in proportion to it: the mass is then only relative to masses of the links, which
     are not measured.
     """
-    fit, case = inference.fit, inference.case
+    fit, problem = inference.fit, inference.problem
     estimate, weight = fit.estimate, fit.weight
-    if not weight or case.massless:
+    if not weight or problem.massless:
         # an error of the payload would be the weight of the links
         return
     block = estimate.parameters.places[WEIGHT]
     shares, intervals = estimate.prior_shares[block], estimate.intervals[block]
-    several_loads = len(np.unique(np.nan_to_num(case.motion.payload_kg[case.used]))) > 1
+    several_loads = len(np.unique(np.nan_to_num(problem.motion.payload_kg[problem.used]))) > 1
     for (name, unit, value, error), share, interval in zip(weight, shares, intervals, strict=True):
         if abs(value) > OPTIONS.min_nuisance_z * error:
             determined = share <= OPTIONS.max_prior_variance_share and (unit != "kg" or several_loads)
             yield name, unit, value, interval, determined
 
 
-def measured_again(case):
-    """Whether poses of a Case were measured more than once under the same conditions."""
-    return repeat_noise(case.measurements[case.used])[1] > 0
+def measured_again(problem):
+    """Whether poses of a problem were measured more than once under the same conditions."""
+    return repeat_noise(problem.measurements[problem.used])[1] > 0
 
 
-def noise_notes(case, stated_mm, contradicted):
+def noise_notes(problem, stated_mm, contradicted):
     """Sentences on a noise that contradicts the stated one (mm per axis, None: none) by more than a factor."""
     if stated_mm == 0.0:
-        yield f"noise_mm is 0, which no instrument reaches: the noise is estimated, {case.noise_mm:.3g} mm per axis"
+        yield f"noise_mm is 0, which no instrument reaches: the noise is estimated, {problem.noise_mm:.3g} mm per axis"
     if not stated_mm:
         return
-    found = f"noise stated {stated_mm:.3g} mm per axis, found {case.noise_mm:.3g}"
-    if case.noise_mm > contradicted * stated_mm:
-        if measured_again(case):
+    found = f"noise stated {stated_mm:.3g} mm per axis, found {problem.noise_mm:.3g}"
+    if problem.noise_mm > contradicted * stated_mm:
+        if measured_again(problem):
             yield f"{found}: the robot does not repeat, or the instrument is worse"
         else:
             yield f"{found}: the instrument is worse, or the robot has errors that are not in the model"
             yield REPEATABILITY_UNKNOWN
-    elif case.noise_mm < stated_mm / contradicted:
+    elif problem.noise_mm < stated_mm / contradicted:
         yield f"{found}: the instrument is better"
 
 
@@ -167,23 +167,23 @@ def bias_notes(inference):
     The biased parameters are those of the least-squares fit to the omitted effect. Each bias is in units of the
     standard error that a calibration without the effect would state. Parameters of the frame do not count.
     """
-    case, linear = inference.case, inference.evidence.linear
+    problem, linear = inference.problem, inference.evidence.linear
     flat = linear.base.reshape(linear.data.size, -1)
     size = np.linalg.norm(flat, axis=0)
     inverse = np.linalg.pinv(flat / size, rcond=1e-9)
-    robot = case.mechanism
+    robot = problem.mechanism
     frame = np.abs(robot.directions[robot.legs.site_numbers[WORLD]]).any(axis=0)
     acting = {key: linear.columns[key] @ numbers for key, numbers in inference.state.effects.items()}
     unexplained = (linear.data - sum(acting.values(), np.zeros(linear.data.shape))).ravel()
     notes = []
     for (name, _), change in acting.items():
         # a discrepancy function is no effect of the library
-        if name in case.effects and case.effects[name].spoils:
+        if name in problem.effects and problem.effects[name].spoils:
             left = unexplained + change.ravel()
             left = left - flat @ (inverse @ left / size)
             noise = np.sqrt((left**2).sum() / max(len(left) - flat.shape[1], 1))
             off = np.where(frame, 0.0, np.abs(inverse @ change.ravel()) / (noise * np.linalg.norm(inverse, axis=1)))
             worst = int(off.argmax())
             wrong = f"{robot.parameters.names[worst]} would be off by {off[worst]:.2g} standard errors"
-            notes.append(f"without {name} {wrong}: {case.effects[name].spoils}")
+            notes.append(f"without {name} {wrong}: {problem.effects[name].spoils}")
     return tuple(notes)

@@ -44,32 +44,32 @@ _STATUS = {
 
 def details_of(inference, verdict, steps, residual_mm, generator, draws):
     """Frames by table name, without the campaign; residual_mm (n, 3): measured minus calibrated model."""
-    case, linear = inference.case, inference.case.linearise(inference.calibrated)
-    exact = case.residual(inference.state) if inference.state.effects else None
-    drive = drive_errors(case.by_point(residual_mm), case.by_point(linear.drive))
+    problem, linear = inference.problem, inference.problem.linearise(inference.calibrated)
+    exact = problem.residual(inference.state) if inference.state.effects else None
+    drive = drive_errors(problem.by_point(residual_mm), problem.by_point(linear.drive))
     return {
-        "gap_locate": variance_by_factor(case, residual_mm, linear.drive, generator, draws),
-        "gap_identifiability": detectability(case, linear),
+        "gap_locate": variance_by_factor(problem, residual_mm, linear.drive, generator, draws),
+        "gap_identifiability": detectability(problem, linear),
         "gap_attribute": _attribute_rows(inference, verdict),
         "gap_sets": _set_rows(inference),
-        "gap_shrink": shrink_table(case, steps, exact),
-        "gap_points": _point_rows(inference, steps[-1].residual_mm[case.positions], drive),
+        "gap_shrink": shrink_table(problem, steps, exact),
+        "gap_points": _point_rows(inference, steps[-1].residual_mm[problem.positions], drive),
     }
 
 
 def _attribute_rows(inference, verdict):
     """Rows of `gap_attribute`: every effect of the library, none and unexplained, with the Verdict's decision on it."""
-    posterior, case = inference.posterior, inference.case
-    result = [_effect_row(inference, name) for name in case.effects]
+    posterior, problem = inference.posterior, inference.problem
+    result = [_effect_row(inference, name) for name in problem.effects]
     result += [
         {"effect": name, "probability": np.nan, **_EMPTY, "note": f"not tested: {note}"}
-        for name, note in case.untestable.items()
+        for name, note in problem.untestable.items()
     ]
     none, unknown = posterior.sets().get((frozenset(), False), 0.0), posterior.probability_unexplained
     result.append({"effect": "none", "probability": none, **_EMPTY})
     result.append({"effect": "unexplained", "probability": unknown, **_EMPTY})
     rows = pd.DataFrame(result)
-    decisions = [NOT_TESTED if name in case.untestable else verdict.decision(name) for name in rows["effect"]]
+    decisions = [NOT_TESTED if name in problem.untestable else verdict.decision(name) for name in rows["effect"]]
     rows.insert(2, "decision", decisions)
     groups = map(verdict.group_of, rows["effect"])
     rows.insert(3, "group_probability", [group.probability if group else np.nan for group in groups])
@@ -78,10 +78,10 @@ def _attribute_rows(inference, verdict):
 
 def where(inference, effects):
     """Where the effects of a verdict act: of each its site in words, or the first and the last of several."""
-    case, found = inference.case, []
+    problem, found = inference.problem, []
     for term in inference.hypothesis.terms:
         if term.effect in effects:
-            names = sites(case.library, case.motion, term)
+            names = sites(problem.library, problem.motion, term)
             found.append(names[0] if len(names) == 1 else f"{names[0]} to {names[-1]}")
     return ", ".join(dict.fromkeys(found))
 
@@ -95,7 +95,7 @@ def _effect_row(inference, name):
         return row | {"note": "far less probable than others"}
     best = max(holding, key=lambda h: h.evidence.max())
     row["log_evidence"] = float(best.evidence.max() - inference.evidence.on_library().none.max())
-    if per_leg(inference.case.library[name]) and (legs := posterior.legs(name)):
+    if per_leg(inference.problem.library[name]) and (legs := posterior.legs(name)):
         row["legs"] = str(max(legs, key=legs.get))
     single = max((h for h in holding if len(h.terms) == 1), key=lambda h: h.evidence.max(), default=None)
     if single:
@@ -130,8 +130,8 @@ def _set_rows(inference):
 
 def parameter_rows(inference):
     """Rows of `gap_parameters`: all parameters of the corrected model with standard errors."""
-    fit, library = inference.fit, inference.case.library
-    parameters, errors = inference.case.mechanism.parameters, fit.estimate.block_errors(GEOMETRY)
+    fit, library = inference.fit, inference.problem.library
+    parameters, errors = inference.problem.mechanism.parameters, fit.estimate.block_errors(GEOMETRY)
     intervals, places = fit.estimate.intervals, fit.estimate.parameters.places
     result = [
         ("calibration", parameter.name, "", parameter.unit, value, error, *interval, held)
@@ -144,7 +144,7 @@ def parameter_rows(inference):
             strict=True,
         )
     ]
-    words = drive_words(inference.case.mechanism)
+    words = drive_words(inference.problem.mechanism)
     for term in fit.terms:
         effect, (values, errors, ends) = library[term.effect], _effect_values(fit, library, term)
         bound = effect.parameters.at_bound(values) & (errors > 0.0)
@@ -155,7 +155,7 @@ def parameter_rows(inference):
                 effect.parameters, places_of(effect, words), values, errors, ends, bound.tolist(), strict=True
             )
         ]
-    bounds, nuisance = inference.case.bounds, intervals[places[WEIGHT]] if WEIGHT in places else ()
+    bounds, nuisance = inference.problem.bounds, intervals[places[WEIGHT]] if WEIGHT in places else ()
     result += [
         (WEIGHT, name, "", unit, value, error, *interval, value in bounds[name])
         for (name, unit, value, error), interval in zip(fit.weight, nuisance, strict=True)
@@ -229,14 +229,14 @@ def _effect_values(fit, library, term):
 
 def _point_rows(inference, after, drive):
     """Rows of `gap_points`; after (n, 3), drive (n, K): residuals of the corrected model and errors of the drives."""
-    case = inference.case
-    frame = case.measurements[["run", "trajectory", "point"]].reset_index(drop=True)
-    before = case.left(inference.calibrated)[: len(frame)]
-    units = case.mechanism.parts.units
-    after, drive = (_at(case.used, values) for values in (after, drive))
+    problem = inference.problem
+    frame = problem.measurements[["run", "trajectory", "point"]].reset_index(drop=True)
+    before = problem.left(inference.calibrated)[: len(frame)]
+    units = problem.mechanism.parts.units
+    after, drive = (_at(problem.used, values) for values in (after, drive))
     unknown = np.full(len(before), np.nan)
     return frame.assign(
-        **rows.vector_columns("command", rows.command(case.measurements)),
+        **rows.vector_columns("command", rows.command(problem.measurements)),
         **rows.vector_columns("before", before),
         **rows.vector_columns("after", after),
         **{
@@ -244,7 +244,7 @@ def _point_rows(inference, after, drive):
             for unit in ("rad", "mm")
             for k, own in zip_longest(range(1, max(len(units), _LEAST_DRIVES) + 1), units)
         },
-        used=case.used,
+        used=problem.used,
     )
 
 
@@ -255,10 +255,10 @@ def _at(used, values):
     return result
 
 
-def left_out(case, use_near_singularity):
-    """Rows of `gap_left_out` without the campaign: the points that a Case does not use, counted by reason."""
-    reasons = _reasons(case, use_near_singularity)
-    counts = pd.Series(reasons[~case.used], dtype=object).value_counts()
+def left_out(problem, use_near_singularity):
+    """Rows of `gap_left_out` without the campaign: the points that a problem does not use, counted by reason."""
+    reasons = _reasons(problem, use_near_singularity)
+    counts = pd.Series(reasons[~problem.used], dtype=object).value_counts()
     found = [reason for reason in REASONS if reason in counts]
     return pd.DataFrame({"reason": found, "points": [int(counts[reason]) for reason in found]})
 
@@ -269,12 +269,12 @@ def left_out_note(table, used, whole):
     return f"{used} of {whole} points used; left out: {counts}"
 
 
-def _reasons(case, use_near_singularity):
-    """Why each point (N,) of a Case may be left out."""
-    frame, (actuators, command) = case.measurements, case.driven
+def _reasons(problem, use_near_singularity):
+    """Why each point (N,) of a problem may be left out."""
+    frame, (actuators, command) = problem.measurements, problem.driven
     status = frame["status"].to_numpy(dtype=object)
-    reached = np.isfinite(case.motion.position_mm).all(axis=1)
-    reached &= np.isfinite(case.mechanism.forward(actuators, guess_mm=command)).all(axis=1)
+    reached = np.isfinite(problem.motion.position_mm).all(axis=1)
+    reached &= np.isfinite(problem.mechanism.forward(actuators, guess_mm=command)).all(axis=1)
     near = (status == "near_singularity") & (not use_near_singularity)
     cases = [
         ("not measured", ~np.isfinite(rows.measured(frame)).all(axis=1)),

@@ -55,7 +55,7 @@ def order_by_share(inference):
     """(term, share of the gap's mean square on left-out points that it removes when it comes next), largest first."""
     hypothesis, level = inference.hypothesis, inference.level
     left, chosen, result = list(hypothesis.terms), [], []
-    noise, counted = 3.0 * inference.case.noise_mm**2, inference.case.on_robot
+    noise, counted = 3.0 * inference.problem.noise_mm**2, inference.problem.on_robot
 
     def gap(terms):
         prediction = inference.held_out.predict(terms, hypothesis.strengths_of(terms, level), level, uncertain=False)
@@ -79,20 +79,20 @@ def shrink_steps(inference, ordered, generator, draws):
     probability that something is unexplained. The draws resample runs (stretches where there are fewer than ten) and
     redraw the fitted numbers.
     """
-    case, hypothesis, level = inference.case, inference.hypothesis, inference.level
-    picks, result = resampled_rows(case, generator, draws), []
+    problem, hypothesis, level = inference.problem, inference.hypothesis, inference.level
+    picks, result = resampled_rows(problem, generator, draws), []
     for count in range(len(ordered) + 1):
         terms = ordered[:count]
         last = count == len(ordered)
         prediction = inference.held_out.predict(terms, hypothesis.strengths_of(terms, level), level, uncertain=last)
-        shown = (prediction.residual_mm**2).sum(axis=1) - 3.0 * case.noise_mm**2
+        shown = (prediction.residual_mm**2).sum(axis=1) - 3.0 * problem.noise_mm**2
         weight = inference.posterior.probability_unexplained if last else 1.0
         numbers = generator.standard_normal((draws, prediction.spread.shape[-1]))
         moved = ((prediction.spread @ numbers.T) ** 2).sum(axis=1).T
         squares = weight * shown + (1.0 - weight) * prediction.uncertainty_mm2
         drawn = picks, weight * shown, (1.0 - weight) * moved
         names = terms[-1].effect if terms else "", tuple(term.effect for term in terms)
-        result.append(ShrinkStep(*names, prediction.residual_mm, squares, *drawn, case.on_robot))
+        result.append(ShrinkStep(*names, prediction.residual_mm, squares, *drawn, problem.on_robot))
     return tuple(result)
 
 
@@ -105,23 +105,23 @@ def share_closed(before, after):
     return share, float(np.minimum(low, share)), float(np.maximum(high, share))
 
 
-def shrink_table(case, steps, resimulated_mm):
+def shrink_table(problem, steps, resimulated_mm):
     """Rows of `gap_shrink` without the campaign.
 
     resimulated_mm (m, 3): residuals of the corrected model, None without effects.
     """
-    trajectory = case.points["trajectory"].to_numpy()
-    noise = float(np.sqrt(3.0) * case.noise_mm)
+    trajectory = problem.points["trajectory"].to_numpy()
+    noise = float(np.sqrt(3.0) * problem.noise_mm)
     rows = []
     for number, step in enumerate(steps):
-        for name in ("*", *pd.unique(trajectory[case.on_robot])):
+        for name in ("*", *pd.unique(trajectory[problem.on_robot])):
             chosen = np.full(len(trajectory), True) if name == "*" else trajectory == name
             part = step.part(chosen)
             share = share_closed(steps[0].part(chosen), part) if number else (np.nan,) * 3
             sizes = _sizes(part.residual_mm[part.counted]) | {"noise_rms_mm": noise, "gap_rms_mm": part.gap_rms_mm}
             rows.append(_label(number, step, name, "held_out") | sizes | dict(zip(CLOSED, share, strict=True)))
     if resimulated_mm is not None:
-        resimulated_mm = resimulated_mm[case.on_robot]
+        resimulated_mm = resimulated_mm[problem.on_robot]
         after = gap_rms((resimulated_mm**2).sum(axis=1) - noise**2)
         sizes = _sizes(resimulated_mm) | {"noise_rms_mm": noise, "gap_rms_mm": after}
         share = _share(steps[0].gap_rms_mm, after), np.nan, np.nan

@@ -1,4 +1,4 @@
-"""A corrected model, and the model linearised about it. Lengths in mm, angles in rad."""
+"""A point of the corrected model, and the model linearised about it. Lengths in mm, angles in rad."""
 
 from dataclasses import dataclass, field, replace
 
@@ -9,9 +9,10 @@ from rrru.effects.protocol import Contribution, is_compliant, lacks_values
 
 
 @dataclass(frozen=True)
-class State:
-    """A corrected model: deviations (p,) of the mechanism and, by effect and number of its shape, coordinates (c,).
+class ModelState:
+    """A point of the corrected model: geometric errors and coefficients of the effects.
 
+    deviations (p,): of the mechanism; effects: (effect, number of its shape) to its coordinates (c,);
     shape_values: effect to the values of its shape's parameters where they have been fitted; "weight" to the errors of
     payload and tilt.
     """

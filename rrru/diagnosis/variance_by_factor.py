@@ -17,27 +17,27 @@ _COLUMNS = ("factor", "level", "points", "rms_mm", "share", "share_low", "share_
 _MORE_COLUMNS = ("drive_rms_rad", "drive_rms_mm", "x_mm", "y_mm", "z_mm")
 
 
-def variance_by_factor(case, residual_mm, drive, generator, draws=200):
+def variance_by_factor(problem, residual_mm, drive, generator, draws=200):
     """Rows of `gap_locate` without the campaign.
 
     residual_mm (m, 3): readings minus calibrated model; drive (m, 3, K): derivative by the actuator values. Shares
     are of the mean square of positions on the robot, those of drives of all that was read, with the noise taken off;
     their 95 % intervals come from resampled runs (stretches where there are fewer than ten).
     """
-    resampled = resampled_rows(case, generator, draws)
-    components = np.where(case.on_robot[:, None], residual_mm**2, 0.0)
-    whole = _Whole(components.sum(axis=1), 3.0 * case.on_robot, case.noise_mm**2, resampled)
+    resampled = resampled_rows(problem, generator, draws)
+    components = np.where(problem.on_robot[:, None], residual_mm**2, 0.0)
+    whole = _Whole(components.sum(axis=1), 3.0 * problem.on_robot, problem.noise_mm**2, resampled)
     rows = []
-    for name, levels in _levels(case).items():
-        for level in pd.unique(levels[(levels != "") & case.on_robot]):
-            chosen = (levels == level) & case.on_robot
+    for name, levels in _levels(problem).items():
+        for level in pd.unique(levels[(levels != "") & problem.on_robot]):
+            chosen = (levels == level) & problem.on_robot
             rows.append(whole.row(name.split()[0], level, np.where(chosen, whole.squares, 0.0), 3.0 * chosen))
             if name == "region":
-                centre = case.motion.position_mm[case.at][chosen].mean(axis=0)
+                centre = problem.motion.position_mm[problem.at][chosen].mean(axis=0)
                 rows[-1] |= dict(zip(("x_mm", "y_mm", "z_mm"), centre.tolist(), strict=True))
-    freedom = case.on_robot.astype(float)
+    freedom = problem.on_robot.astype(float)
     rows.extend(whole.row("direction", axis, components[:, k], freedom) for k, axis in enumerate("xyz"))
-    rows.extend(_drive_rows(case, residual_mm, drive, resampled))
+    rows.extend(_drive_rows(problem, residual_mm, drive, resampled))
     return pd.DataFrame(rows).reindex(columns=[*_COLUMNS, *_MORE_COLUMNS])
 
 
@@ -91,9 +91,13 @@ class _Whole:
         }
 
 
-def _levels(case):
+def _levels(problem):
     """Level (n,) of each point by factor; an empty text where it is unknown."""
-    frame, position, rate = case.points, case.motion.position_mm[case.at], case.motion.drive_rate[case.at]
+    frame, position, rate = (
+        problem.points,
+        problem.motion.position_mm[problem.at],
+        problem.motion.drive_rate[problem.at],
+    )
     result = {"trajectory": frame["trajectory"].to_numpy(dtype=object), "region": _cells(position)}
     for name, column, unit in (("speed", "speed_mm_s", "mm/s"), ("payload", "payload_kg", "kg")):
         values = frame[column].to_numpy(dtype=float)
@@ -105,7 +109,7 @@ def _levels(case):
         quarter = np.char.add("quarter ", (np.searchsorted(edges, time, side="right") + 1).astype(str))
         result["time"] = np.where(np.isfinite(time), quarter, "").astype(object)
     if np.isfinite(rate).any():
-        for k, name in enumerate(drive_words(case.mechanism).all_names):
+        for k, name in enumerate(drive_words(problem.mechanism).all_names):
             backwards = np.where(rate[:, k] < -OPTIONS.min_drive_rate, "falling", "at rest")
             sense = np.where(rate[:, k] > OPTIONS.min_drive_rate, "rising", backwards)
             named = np.char.add(f"{name} ", sense)
@@ -120,19 +124,19 @@ def _cells(position):
     return np.array([f"x{i + 1} y{j + 1} z{k + 1}" for i, j, k in index], dtype=object)
 
 
-def _drive_rows(case, residual_mm, drive, resampled):
+def _drive_rows(problem, residual_mm, drive, resampled):
     """Rows of the factor drive: shares of the squared errors of the drives."""
-    residual_mm, drive = case.by_point(residual_mm), case.by_point(drive)
-    errors, number = drive_errors(residual_mm, drive), np.flatnonzero(case.used)
-    resampled = np.searchsorted(number, case.at[resampled])
+    residual_mm, drive = problem.by_point(residual_mm), problem.by_point(drive)
+    errors, number = drive_errors(residual_mm, drive), np.flatnonzero(problem.used)
+    resampled = np.searchsorted(number, problem.at[resampled])
     # in units of each drive's own noise, so that poses of a large Jacobian do not dominate
-    noise = case.noise_mm**2 * (np.linalg.pinv(drive) ** 2).sum(axis=-1)
+    noise = problem.noise_mm**2 * (np.linalg.pinv(drive) ** 2).sum(axis=-1)
     # a drive of another arm than the one that is read moves nothing; no drive moves a target fixed to the world
     scaled = np.divide(errors**2, noise, out=np.zeros_like(noise), where=noise > 0.0)
     moving = (noise > 0.0).astype(float)
     whole, rows = _Whole(scaled.sum(axis=1), moving.sum(axis=1), 1.0, resampled), []
-    names = drive_words(case.mechanism).all_names
-    for k, (name, unit) in enumerate(zip(names, case.mechanism.parts.units, strict=True)):
+    names = drive_words(problem.mechanism).all_names
+    for k, (name, unit) in enumerate(zip(names, problem.mechanism.parts.units, strict=True)):
         moved = np.linalg.norm(drive[:, :3, k] * errors[:, k, None], axis=1)
         row = whole.row("drive", name, scaled[:, k], moving[:, k])
         row["rms_mm"] = float(np.sqrt((moved**2).mean()))

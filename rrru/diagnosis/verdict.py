@@ -196,7 +196,7 @@ def why_no_answer(inference, stated_mm=None):
 
 def _at_bounds(inference):
     """Which geometric errors end at bounds, in words; empty where none."""
-    estimate, parameters = inference.fit.estimate, inference.case.mechanism.parameters
+    estimate, parameters = inference.fit.estimate, inference.problem.mechanism.parameters
     held = np.flatnonzero(estimate.at_bound[estimate.parameters.places[GEOMETRY]])
     if not len(held):
         return ""
@@ -210,10 +210,10 @@ def _at_bounds(inference):
 
 def _far_off(inference, stated_mm):
     """How far the best answer is from the readings, in words; empty where that is less than many times the noise."""
-    case = inference.case
-    left = float(np.sqrt((case.residual(inference.state) ** 2).sum(axis=1).mean()))
-    repeated, count = repeat_noise(case.measurements[case.used])
-    axis_mm = max(stated_mm or case.noise_mm, repeated if count else 0.0)
+    problem = inference.problem
+    left = float(np.sqrt((problem.residual(inference.state) ** 2).sum(axis=1).mean()))
+    repeated, count = repeat_noise(problem.measurements[problem.used])
+    axis_mm = max(stated_mm or problem.noise_mm, repeated if count else 0.0)
     noise = float(np.sqrt(3.0) * axis_mm)
     if left <= OPTIONS.max_left_per_noise * noise:
         return ""

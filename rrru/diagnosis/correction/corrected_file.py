@@ -49,24 +49,24 @@ def found_of(inference, stated_reflectors=False):
 
     stated_reflectors: whether reflectors whose places are stated belong to it, too.
     """
-    case, state = inference.case, inference.state
-    library, sites = case.library, case.mechanism.legs.sites
-    constant = {key: state.contribution(library, key, case.motion).twists for key in state.effects}
+    problem, state = inference.problem, inference.state
+    library, sites = problem.library, problem.mechanism.legs.sites
+    constant = {key: state.contribution(library, key, problem.motion).twists for key in state.effects}
     constant = {key: twists for key, twists in constant.items() if np.ndim(twists) == 3 and len(twists) == 1}
-    twists = case.mechanism.twists(state.deviations)[0] + sum(one[0] for one in constant.values())
+    twists = problem.mechanism.twists(state.deviations)[0] + sum(one[0] for one in constant.values())
     steps, coordinates = inference.fit.one_sigma_steps()
-    spread = np.einsum("scp,qp->qsc", case.mechanism.directions, steps)
+    spread = np.einsum("scp,qp->qsc", problem.mechanism.directions, steps)
     for key, twist in constant.items():
-        moved = (state.contribution(library, key, case.motion, state.effects[key] + one) for one in coordinates[key])
+        moved = (state.contribution(library, key, problem.motion, state.effects[key] + one) for one in coordinates[key])
         spread = spread + np.stack([one.twists[0] - twist[0] for one in moved])
     moves = [k for k in range(len(sites)) if twists[k].any() or spread[:, k].any()]
-    numbers, count = parameter_rows(inference), len(case.mechanism.parts.drives)
-    loads = np.nan_to_num(np.abs(case.motion.drive_load)).max(axis=0)
+    numbers, count = parameter_rows(inference), len(problem.mechanism.parts.drives)
+    loads = np.nan_to_num(np.abs(problem.motion.drive_load)).max(axis=0)
     found = Found(
         {sites[k]: twists[k] for k in moves},
         {sites[k]: spread[:, k] for k in moves},
-        _places(case, stated_reflectors),
-        tuple(case.mechanism.tool_mm),
+        _places(problem, stated_reflectors),
+        tuple(problem.mechanism.tool_mm),
         _of_drives(numbers, *_COMPLIANCE, count),
         _of_drives(numbers, *_BACKLASH, count),
         dict(enumerate(loads.tolist())),
@@ -81,7 +81,7 @@ def fitted_in_file(inference, section):
     Other parameters, such as shifts between the axes of a ball, can absorb errors in the fit; a file written without
     them would lack these corrections. section: the robot's entry in the configuration.
     """
-    mechanism = inference.case.mechanism
+    mechanism = inference.problem.mechanism
     if "urdf" in section:
         parts = urdf_parts(section["urdf"], **{key: section.get(key) for key in ("base", "tip", "home")})
     else:
@@ -90,12 +90,12 @@ def fitted_in_file(inference, section):
     if set(mechanism.parameters.names) <= set(held):
         return inference
     names = [name for name in held if name in mechanism.among] if mechanism.among else held
-    case = replace(inference.case, mechanism=replace(mechanism, among=tuple(names)))
+    problem = replace(inference.problem, mechanism=replace(mechanism, among=tuple(names)))
     fitted, state = inference.fit.model, inference.state
-    start = replace(calibrate(case), effects=state.effects, shape_values=state.shape_values)
-    of_case = replace(fitted.case, mechanism=case.mechanism)
-    fit = fit_model(of_case, [start], fitted.terms, fitted.scales, inference.fit.level, fitted.signed)
-    return replace(inference, case=case, fit=fit)
+    start = replace(calibrate(problem), effects=state.effects, shape_values=state.shape_values)
+    of_problem = replace(fitted.problem, mechanism=problem.mechanism)
+    fit = fit_model(of_problem, [start], fitted.terms, fitted.scales, inference.fit.level, fitted.signed)
+    return replace(inference, problem=problem, fit=fit)
 
 
 def _with_misfit(inference, spread):
@@ -116,14 +116,14 @@ def _of_drives(numbers, effect, stem, count):
     return {k: tuple(of_effect.loc[f"{stem}{k + 1}", columns]) for k in range(count) if len(of_effect)}
 
 
-def _places(case, stated):
+def _places(problem, stated):
     """Places (3,) on the platform, before what was found, by site: of reflectors that were found, or stated, too."""
-    reads = case.mechanism.reads
+    reads = problem.mechanism.reads
     wanted = set(reads.reflectors if stated else reads.fitted)
     if not wanted:
         return {}
-    on_world = rows.on_the_world(case.measurements)
-    frame = case.measurements if on_world is None else case.measurements[~on_world]
+    on_world = rows.on_the_world(problem.measurements)
+    frame = problem.measurements if on_world is None else problem.measurements[~on_world]
     places, sites = rows.vectors(frame, "target"), rows.sites(frame["target"]).to_numpy()
     return {name: places[np.flatnonzero(sites == name)[0]] for name in pd.unique(sites) if name in wanted}
 

@@ -94,16 +94,16 @@ def _remainder(shrink, more, written, inference, expected):
     left, whole = _left_mm(more, "corrected_model"), _left_mm(shrink, "held_out")
     if written.lacking or of_weight:
         names = ", ".join([*map(readable, written.lacking), *(f"that {note}" for note in of_weight)])
-        size = f": {expected:.2g} mm rms remain {_conditions(inference.case)}" if np.isfinite(expected) else ""
+        size = f": {expected:.2g} mm rms remain {_conditions(inference.problem)}" if np.isfinite(expected) else ""
         return f"this {_holds(written)} and not {names}{size}; use corrected_drives"
     if not left > OPTIONS.max_file_remainder_ratio * whole:
         return ""
     return f"this file leaves {left:.2g} mm rms at the readings, the diagnosis {whole:.2g} mm; use corrected_drives"
 
 
-def _conditions(case):
+def _conditions(problem):
     """Poses, payloads, speeds and temperatures of the readings in use, in words: a residual error holds for these."""
-    frame = case.measurements[case.used]
+    frame = problem.measurements[problem.used]
     moved = "robot at rest" if rests(frame) else _range(frame, "speed_mm_s", "speed", "mm/s")
     loads = (_range(frame, "payload_kg", "payload", "kg"), moved, _range(frame, "temperature_c", "temperature", "°C"))
     return f"at poses and loads like those measured ({', '.join(loads)})"
@@ -138,8 +138,8 @@ def _headline(written, error):
 
 def _model(inference, written, section, file):
     """The FileModel of a Corrected file, loaded anew."""
-    robot = _robot(inference.case, section | {"mjcf" if written.mjcf else "urdf": str(file)})
-    return FileModel(robot, written.in_file, _instrument(inference.case, robot, written.found, True))
+    robot = _robot(inference.problem, section | {"mjcf" if written.mjcf else "urdf": str(file)})
+    return FileModel(robot, written.in_file, _instrument(inference.problem, robot, written.found, True))
 
 
 def gap_rows(inference, corrected, section, file, shrink):
@@ -152,35 +152,35 @@ def gap_rows(inference, corrected, section, file, shrink):
     """
     key = "mjcf" if "mjcf" in section else "urdf"
     models = [
-        ("given_model", _robot(inference.case, section), {}),
-        ("corrected_model", _robot(inference.case, section | {key: str(file)}), corrected.in_file),
+        ("given_model", _robot(inference.problem, section), {}),
+        ("corrected_model", _robot(inference.problem, section | {key: str(file)}), corrected.in_file),
     ]
     files, why = (section[key], file), ""
     try:
         if key == "urdf":
             raise ConfigError("a URDF has no actuators")
         poses = [
-            simulated(inference.case.motion, robot, Path(one), section["platform"])
+            simulated(inference.problem.motion, robot, Path(one), section["platform"])
             for (_, robot, _), one in zip(models, files, strict=True)
         ]
     except (ConfigError, SimulationError, UnreachableError) as error:
         why = f"corrected model not driven, but closed at its drive values, since {error}"
-        poses = [_closed(inference.case, robot, effects) for _, robot, effects in models]
-    result, case = [], inference.case
-    known = case.on_robot & case.complete({term.effect for term in inference.fit.terms})
+        poses = [_closed(inference.problem, robot, effects) for _, robot, effects in models]
+    result, problem = [], inference.problem
+    known = problem.on_robot & problem.complete({term.effect for term in inference.fit.terms})
     for (kind, robot, _), (at, twists) in zip(models, poses, strict=True):
-        twists = twists + _instrument(case, robot, corrected.found, kind == "corrected_model")
+        twists = twists + _instrument(problem, robot, corrected.found, kind == "corrected_model")
         # the file is not judged where the sense of arrival of a drive is unknown
-        left = np.where(known[:, None], case.by_other(robot, at, twists), np.nan)
+        left = np.where(known[:, None], problem.by_other(robot, at, twists), np.nan)
         if np.isfinite(left).all(axis=1).any():
-            result.append(model_row(shrink, kind, left, case.noise_mm))
+            result.append(model_row(shrink, kind, left, problem.noise_mm))
     return pd.DataFrame(result), why
 
 
-def _robot(case, section):
+def _robot(problem, section):
     """The robot of a file."""
-    robot = make_mechanism(case.mechanism.name, section, parameter_set="frame")
-    return robot.reading(case.mechanism.reads)
+    robot = make_mechanism(problem.mechanism.name, section, parameter_set="frame")
+    return robot.reading(problem.mechanism.reads)
 
 
 def simulated(motion, robot, file, platform):
@@ -212,26 +212,26 @@ def _nowhere(robot, count):
     )
 
 
-def _closed(case, robot, effects):
+def _closed(problem, robot, effects):
     """Poses (n) of a robot closed at the drive values of the campaign and what effects add, and its twists."""
-    twists = FileModel(robot, effects, robot.twists()).twists(case.motion)
-    actuators, command = rows.actuators(case.measurements, robot), rows.command(case.measurements)
+    twists = FileModel(robot, effects, robot.twists()).twists(problem.motion)
+    actuators, command = rows.actuators(problem.measurements, robot), rows.command(problem.measurements)
     return robot.solve(actuators, command, twists), twists
 
 
-def _instrument(case, robot, found, corrected):
+def _instrument(problem, robot, found, corrected):
     """Twists (1, sites, 6) of what is read: the reflectors' places, and the tool's where it is corrected or these are.
 
     The frame is the file's, so that reflectors that are not on the robot are moved by it.
     """
     result, numbers = robot.twists(), robot.legs.site_numbers
-    reads = case.mechanism.reads
+    reads = problem.mechanism.reads
     named = {*reads.fitted, *((TOOL,) if corrected or reads.fitted or reads.turned else ())}
     for name in named & set(found.twists):
         result[0, numbers[name]] = found.twists[name]
-    on_world = rows.on_the_world(case.measurements)
+    on_world = rows.on_the_world(problem.measurements)
     if on_world is not None:
-        frame = case.measurements[on_world]
+        frame = problem.measurements[on_world]
         places, sites = rows.vectors(frame, "target"), rows.sites(frame["target"]).to_numpy()
         world = placement_of(found.twists.get(WORLD, np.zeros(6)))
         for name in pd.unique(sites):
@@ -271,14 +271,14 @@ class FileError:
 
 def file_error(inference, model, masses, generator):
     """The FileError of a FileModel; masses: of the robot; generator: draws the fresh poses."""
-    case = inference.case
-    actuators, command = case.driven
-    twists = model.twists(case.motion)
+    problem = inference.problem
+    actuators, command = problem.driven
+    twists = model.twists(problem.motion)
     poses = model.robot.solve(actuators, command, twists)
-    of_file = case.by_other(model.robot, poses, twists + model.instrument)
-    known = case.on_robot & case.complete({term.effect for term in inference.fit.terms})
+    of_file = problem.by_other(model.robot, poses, twists + model.instrument)
+    known = problem.on_robot & problem.complete({term.effect for term in inference.fit.terms})
     of_file, diagnosed, calibrated = (
-        left[known] for left in (of_file, case.residual(inference.state), case.residual(inference.calibrated))
+        left[known] for left in (of_file, problem.residual(inference.state), problem.residual(inference.calibrated))
     )
     fresh = _fresh_differences(inference, model, masses, generator)
     return FileError(_rms(of_file - diagnosed), _rms(fresh), _rms(of_file), _rms(calibrated))
@@ -295,10 +295,10 @@ def _fresh_differences(inference, model, masses, generator):
 
     The drive values are weighted means of those at three measured poses, so that they lie within the measured range.
     """
-    case = inference.case
-    robot, (actuators, command) = case.mechanism, case.driven
-    on_world = rows.on_the_world(case.measurements)
-    usable = np.flatnonzero(case.used if on_world is None else case.used & ~on_world)
+    problem = inference.problem
+    robot, (actuators, command) = problem.mechanism, problem.driven
+    on_world = rows.on_the_world(problem.measurements)
+    usable = np.flatnonzero(problem.used if on_world is None else problem.used & ~on_world)
     picks = usable[generator.integers(len(usable), size=(OPTIONS.fresh_poses, 3))]
     share = generator.dirichlet(np.ones(3), len(picks))
     drive, near = (np.einsum("nk,nkd->nd", share, values[picks]) for values in (actuators, command))
@@ -307,8 +307,8 @@ def _fresh_differences(inference, model, masses, generator):
     closed = np.flatnonzero(poses.closed)
     drive, approach = drive[closed], approach[closed]
     position = robot.measured(poses.of(closed), robot.twists())
-    motion = at_rest(robot, masses, (position, drive, *at_end(case)), approach, drive)
-    readings = None if case.readings is None else case.readings.of(picks[closed, 0])
+    motion = at_rest(robot, masses, (position, drive, *at_end(problem)), approach, drive)
+    readings = None if problem.readings is None else problem.readings.of(picks[closed, 0])
     diagnosed, written = (
         robot.twists(inference.state.deviations) + effect_twists(inference, motion),
         model.twists(motion),

@@ -21,9 +21,9 @@ _APPROACH = {"rad": OPTIONS.approach_distance_rad, "mm": OPTIONS.approach_distan
 
 def corrected_drives(inference, masses):
     """Rows of `corrected_drives` of an inference; masses: of the robot."""
-    case = inference.case
-    robot, known = case.mechanism, case.used
-    commands, drives = rows.command(case.measurements)[known], rows.actuators(case.measurements, robot)[known]
+    problem = inference.problem
+    robot, known = problem.mechanism, problem.used
+    commands, drives = rows.command(problem.measurements)[known], rows.actuators(problem.measurements, robot)[known]
     position, nearest = _grid(commands)
     stated = robot.solve(drives[nearest], commands[nearest])
     turn = stated.turn
@@ -32,7 +32,7 @@ def corrected_drives(inference, masses):
     )
     reached = np.isfinite(nominal).all(axis=1)
     position, turn, nominal = position[reached], turn[reached], nominal[reached]
-    payload, end_s = at_end(case)
+    payload, end_s = at_end(problem)
     found = {}
     for approach in (-1, 1):
         corrected = nominal
@@ -75,10 +75,10 @@ def _grid(commands):
     return points[far <= OPTIONS.max_grid_distance_steps], number[far <= OPTIONS.max_grid_distance_steps]
 
 
-def at_end(case):
-    """The largest payload in kg and the time in s of the end of a Case's campaign."""
-    payload_kg = float(np.nan_to_num(case.motion.payload_kg[case.used]).max(initial=0.0))
-    return payload_kg, float(np.nanmax(case.motion.time_s, initial=0.0))
+def at_end(problem):
+    """The largest payload in kg and the time in s of the end of a problem's campaign."""
+    payload_kg = float(np.nan_to_num(problem.motion.payload_kg[problem.used]).max(initial=0.0))
+    return payload_kg, float(np.nanmax(problem.motion.time_s, initial=0.0))
 
 
 def at_rest(robot, masses, state, approach, nominal):
@@ -107,7 +107,7 @@ def at_rest(robot, masses, state, approach, nominal):
 
 def effect_twists(inference, motion):
     """Twists of the effects of an inference's state that a robot at rest has."""
-    state, library = inference.state, inference.case.library
+    state, library = inference.state, inference.problem.library
     change = Contribution(motion.robot.twists())
     for key in state.effects:
         needs = library[key[0]].needs

@@ -18,7 +18,7 @@ from rrru.campaign import measurements as rows
 from rrru.diagnosis.design import poses
 from rrru.diagnosis.design.expected_information import contests_of, greedy, realized, worth
 from rrru.diagnosis.design.run_limits import RunLimits, StatedLimits, run_limits
-from rrru.diagnosis.make_problem import make_case
+from rrru.diagnosis.make_problem import make_diagnosis_problem
 from rrru.diagnosis.options import OPTIONS
 
 RUN = ("run", "kind", "trajectory", "reverse", "speed_mm_s", "payload_kg", "points")
@@ -58,7 +58,7 @@ def advise(inference, verdict, masses, stated=None, sizes=None):
     if not contests:
         return NOTHING
     stated = stated or StatedLimits()
-    limits, limited = run_limits(inference.case, masses, stated)
+    limits, limited = run_limits(inference.problem, masses, stated)
     result = _runs(inference, contests, masses, limits)
     seen = [_realized(inference, contest, result, number) for number, contest in enumerate(contests)]
     result = [_as_realized(row, seen[row["contest"]]) for row in result]
@@ -84,10 +84,10 @@ def advise(inference, verdict, masses, stated=None, sizes=None):
 
 def _runs(inference, contests, masses, limits):
     """Rows of `gap_next_runs` of all candidate runs, with the number of the Contest that each is counted for."""
-    choice, table = candidates(inference.case.measurements, limits)
+    choice, table = candidates(inference.problem.measurements, limits)
     if not choice:
         return []
-    planned, result = _planned(inference.case, table, masses), []
+    planned, result = _planned(inference.problem, table, masses), []
     for number, contest in enumerate(contests):
         if not _have_inputs(planned, contest):
             continue
@@ -107,7 +107,7 @@ def _realized(inference, contest, rows, number):
     """
     again = [row for row in rows if row["contest"] == number and row["run"] == f"{row['trajectory']} {_AGAIN}"]
     expected = {row["trajectory"]: row["gain_nats"] for row in again}
-    frame = inference.case.measurements[inference.case.used]
+    frame = inference.problem.measurements[inference.problem.used]
     driven = frame.groupby("run", sort=False)["trajectory"].first().astype(str)
     repeated = driven[driven.duplicated() & driven.isin(expected)]
     if repeated.empty:
@@ -131,9 +131,11 @@ def _as_realized(row, seen):
     return row | {"gain_nats": row["gain_nats"] - (1.0 - share) * min(row["gain_nats"], max(plain, 0.0))}
 
 
-def _planned(case, table, masses):
-    """The case of a table of planned runs."""
-    return make_case(table, case.mechanism, masses, case.noise_mm, case.effects, arm_mm=case.arm_mm)
+def _planned(problem, table, masses):
+    """The problem of a table of planned runs."""
+    return make_diagnosis_problem(
+        table, problem.mechanism, masses, problem.noise_mm, problem.effects, arm_mm=problem.arm_mm
+    )
 
 
 def _have_inputs(planned, contest):
@@ -147,13 +149,13 @@ def _poses(inference, contest, masses, limits):
 
     They are driven as the campaign was, or faster, or with a higher payload, whichever is most informative.
     """
-    case, best = inference.case, ([], NOTHING.poses)
-    passes = poses.passes(case.measurements, case.mechanism)
+    problem, best = inference.problem, ([], NOTHING.poses)
+    passes = poses.passes(problem.measurements, problem.mechanism)
     if not len(passes):
         return best
-    stated_speed, own_load = (float(case.measurements[name].median()) for name in ("speed_mm_s", "payload_kg"))
-    own_speed = stated_speed if np.isfinite(stated_speed) else _speed(case.measurements)
-    last_s, own_load, most = _end_s(case.measurements), float(np.nan_to_num(own_load)), 0.0
+    stated_speed, own_load = (float(problem.measurements[name].median()) for name in ("speed_mm_s", "payload_kg"))
+    own_speed = stated_speed if np.isfinite(stated_speed) else _speed(problem.measurements)
+    last_s, own_load, most = _end_s(problem.measurements), float(np.nan_to_num(own_load)), 0.0
     for fast, loaded in product((False, True), repeat=2):
         speed = limits.fast(stated_speed, np.full(1, np.nan)) if fast else own_speed
         load = limits.loaded_kg(own_load) if loaded else own_load
@@ -163,8 +165,8 @@ def _poses(inference, contest, masses, limits):
         some = passes.some([not fast or limits.slower(rate * speed) >= 1.0 for rate in passes.rates_per_mm])
         if not len(some) or not limits.allows(speed, load):
             continue
-        table = some.commands(case.mechanism, last_s + OPTIONS.pause_between_runs_s, speed, load)
-        planned = _planned(case, table, masses)
+        table = some.commands(problem.mechanism, last_s + OPTIONS.pause_between_runs_s, speed, load)
+        planned = _planned(problem, table, masses)
         if not _have_inputs(planned, contest):
             continue
         now, added = worth(inference, contest.truth, contest.rival, planned)

@@ -15,7 +15,7 @@ import numpy as np
 import pandas as pd
 
 from rrru.diagnosis.options import OPTIONS
-from rrru.diagnosis.state import State
+from rrru.diagnosis.state import ModelState
 from rrru.diagnosis.terms import signatures, spread
 from rrru.diagnosis.verdict import label
 
@@ -55,30 +55,30 @@ class Sums:
 
 
 def worth(inference, truth, rival, planned):
-    """Sums of the present campaign, the prior among them, and of each run of a planned Case in order of its number.
+    """Sums of the present campaign, the prior among them, and of each run of a planned problem in order of its number.
 
     truth, rival: the answers, each (hypothesis, level) as `Posterior.best_of` gives it.
     """
     (hypothesis, level), (other, other_level) = truth, rival
-    case, evidence = inference.case, inference.evidence
+    problem, evidence = inference.problem, inference.evidence
     terms = hypothesis.terms + other.terms
     # the errors of payload and tilt are the same in both answers
     keys = list(dict.fromkeys((t.effect, t.shape) for t in terms))
-    here, planned = (reachable(replace(one, nuisance_sd={}), inference.state) for one in (case, planned))
+    here, planned = (reachable(replace(one, nuisance_sd={}), inference.state) for one in (problem, planned))
     # both about one state: the linearisation of the evidence is that of the previous fit
     present, there = (one.linearise(inference.state, keys) for one in (here, planned))
     mean, _ = evidence.coefficients(hypothesis.terms, hypothesis.prior_scales[level], level)
-    mean = mean[: sum(spread(case.library[t.effect].coordinates, t.legs).shape[1] for t in hypothesis.terms)]
+    mean = mean[: sum(spread(problem.library[t.effect].coordinates, t.legs).shape[1] for t in hypothesis.terms)]
     made, designs = [], []
     for linear in (present, there):
         none = np.zeros((*linear.data.shape, 0))
-        made.append(np.concatenate([none, *signatures(case.library, linear, hypothesis.terms)], axis=-1) @ mean)
-        designs.append(np.concatenate([linear.base, *signatures(case.library, linear, other.terms)], axis=-1))
+        made.append(np.concatenate([none, *signatures(problem.library, linear, hypothesis.terms)], axis=-1) @ mean)
+        designs.append(np.concatenate([linear.base, *signatures(problem.library, linear, other.terms)], axis=-1))
     penalty = np.zeros(designs[0].shape[-1])
     penalty[there.base.shape[-1] :] = evidence.scales(other.terms, other.prior_scales[other_level]) ** -2.0
-    now = Sums.of(designs[0], made[0], case.noise_mm) + Sums(np.diag(penalty), np.zeros(len(penalty)), 0.0)
+    now = Sums.of(designs[0], made[0], problem.noise_mm) + Sums(np.diag(penalty), np.zeros(len(penalty)), 0.0)
     runs = [planned.run == number for number in np.unique(planned.measurements["run"])]
-    return now, [Sums.of(designs[1][run], made[1][run], case.noise_mm) for run in runs]
+    return now, [Sums.of(designs[1][run], made[1][run], problem.noise_mm) for run in runs]
 
 
 def realized(inference, truth, rival):
@@ -86,29 +86,29 @@ def realized(inference, truth, rival):
 
     log p(d_r | others, A) - log p(d_r | others, B) in nats, of the linearisation, by number of run; empty for one run.
     """
-    case = reachable(replace(inference.case, nuisance_sd={}), inference.state)
+    problem = reachable(replace(inference.problem, nuisance_sd={}), inference.state)
     answers = [(hypothesis.terms, hypothesis.prior_scales[level]) for hypothesis, level in (truth, rival)]
     keys = list(dict.fromkeys((term.effect, term.shape) for terms, _ in answers for term in terms))
-    linear = case.linearise(inference.state, keys)
+    linear = problem.linearise(inference.state, keys)
     base = np.concatenate([linear.base, *linear.shape_columns.values()], axis=-1)
-    runs = {number: case.run == number for number in pd.unique(case.run)}
+    runs = {number: problem.run == number for number in pd.unique(problem.run)}
     result = dict.fromkeys(runs, 0.0) if len(runs) > 1 else {}
     for sign, (terms, scales) in zip((1.0, -1.0), answers, strict=True):
-        design = np.concatenate([base, *signatures(case.library, linear, terms)], axis=-1)
+        design = np.concatenate([base, *signatures(problem.library, linear, terms)], axis=-1)
         penalty = np.zeros(design.shape[-1])
         penalty[base.shape[-1] :] = inference.evidence.scales(terms, scales) ** -2.0
-        parts = {number: Sums.of(design[rows], linear.data[rows], case.noise_mm) for number, rows in runs.items()}
+        parts = {number: Sums.of(design[rows], linear.data[rows], problem.noise_mm) for number, rows in runs.items()}
         whole = sum(parts.values(), Sums(np.diag(penalty), np.zeros(len(penalty)), 0.0))
         for number in result:
             result[number] += sign * ((whole - parts[number]).cost() - whole.cost())
     return result
 
 
-def reachable(case, state):
-    """A Case without the points at which a state's model, with its effects or without them, has no pose."""
-    left = [case.residual(one) for one in (state, State(state.deviations, {}))]
+def reachable(problem, state):
+    """The problem without the points at which a state's model, with its effects or without them, has no pose."""
+    left = [problem.residual(one) for one in (state, ModelState(state.deviations, {}))]
     lost = ~np.isfinite(left).all(axis=(0, 2))
-    return case.without(lost) if lost.any() else case
+    return problem.without(lost) if lost.any() else problem
 
 
 def greedy(now, candidates, most):

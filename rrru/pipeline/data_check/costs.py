@@ -7,7 +7,7 @@ from rrru.campaign.driven_path import passes_points
 from rrru.campaign.noise import ENOUGH_REPEATS, read_noise, repeat_noise
 from rrru.diagnosis.determined import poses_needed, require_determined
 from rrru.diagnosis.diagnose import with_wide_bounds
-from rrru.diagnosis.make_problem import make_case
+from rrru.diagnosis.make_problem import make_diagnosis_problem
 from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.settings import GapSettings
 from rrru.errors import FitError, RrruError
@@ -36,7 +36,7 @@ def costs(measurements, config, section):
         robot = setup.measured_robot(nominal, measurements)
         library = GapSettings.from_config(config["gap"]).library(robot)
         masses = Masses(**parts.masses(config, section))
-        case = make_case(
+        problem = make_diagnosis_problem(
             measurements,
             with_wide_bounds(robot),
             masses,
@@ -48,15 +48,15 @@ def costs(measurements, config, section):
     except RrruError as error:
         return [*said, f"no diagnosis: {error}"]
     try:
-        case = require_determined(case)
+        problem = require_determined(problem)
     except FitError as error:
         said.insert(0, f"no diagnosis: {error}")
-    return [*_numbers(nominal, robot), *said, *_untested(case), *_one_way(case), _poses(case)]
+    return [*_numbers(nominal, robot), *said, *_untested(problem), *_one_way(problem), _poses(problem)]
 
 
-def _poses(case):
+def _poses(problem):
     """Sentence on the number of poses that the calibration needs."""
-    rank, needed, read = poses_needed(case)
+    rank, needed, read = poses_needed(problem)
     spare = f"{OPTIONS.min_spare_numbers} degrees of freedom to spare"
     return f"{read} poses are read; their {rank} identifiable parameters need at least {needed}, with {spare}"
 
@@ -87,10 +87,10 @@ def _numbers(nominal, robot):
         yield f"not identifiable from these poses: {', '.join(lost[:_SHOWN])}{more}; the calibration fixes them"
 
 
-def _untested(case):
+def _untested(problem):
     """Sentences on effects that are not testable, by the reason."""
     reasons = {}
-    for name, reason in case.untestable.items():
+    for name, reason in problem.untestable.items():
         reasons.setdefault(reason, []).append(name)
     for reason, names in reasons.items():
         needs = [remedy for need, remedy in _REMEDIES.items() if need in reason]
@@ -98,16 +98,16 @@ def _untested(case):
         yield f"not testable: {', '.join(names)} ({reason}){remedy}"
 
 
-def _one_way(case):
+def _one_way(problem):
     """Sentence on drives that approach every point from the same side."""
-    motion = case.motion
+    motion = problem.motion
     before = motion.path_drive[np.maximum(motion.path_index - 1, 0)]
     known = np.isfinite(motion.last_move).all(axis=1)
-    step = np.where(known[:, None], np.nan_to_num(motion.last_move), motion.drive - before)[case.used]
+    step = np.where(known[:, None], np.nan_to_num(motion.last_move), motion.drive - before)[problem.used]
     up, down = (step > 0.0).mean(axis=0), (step < 0.0).mean(axis=0)
     same = [
         column
-        for column, one, other in zip(case.mechanism.parts.columns, up, down, strict=True)
+        for column, one, other in zip(problem.mechanism.parts.columns, up, down, strict=True)
         if min(one, other) < _ONE_WAY
     ]
     if same:
