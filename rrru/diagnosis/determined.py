@@ -8,16 +8,18 @@ from dataclasses import replace
 
 import numpy as np
 
+from rrru.diagnosis.aliases import BoolArray, FloatArray
 from rrru.diagnosis.approach_direction import has_direction
 from rrru.diagnosis.calibrate import observations_of
 from rrru.diagnosis.options import OPTIONS
+from rrru.diagnosis.problem import DiagnosisProblem
 from rrru.errors import FitError
 
 # singular values of columns of unit length below this share of the largest are rounding
 _RANK_TOLERANCE = 1e-9
 
 
-def require_determined(problem, whose=""):
+def require_determined(problem: DiagnosisProblem, whose: str = "") -> DiagnosisProblem:
     """The problem without effects that lack what they need at too many readings.
 
     The others have to determine the calibration with `OPTIONS.min_spare_numbers` to spare. whose: first words of a
@@ -41,14 +43,14 @@ def require_determined(problem, whose=""):
     return replace(problem, library=library, untestable=problem.untestable | reasons, known=known)
 
 
-def poses_needed(problem):
+def poses_needed(problem: DiagnosisProblem) -> tuple[int, int, int]:
     """Rank of the calibration at a problem's poses, poses that a diagnosis needs at least and poses that were read."""
     rank = _rank(observations_of(problem).jacobian(problem.mechanism.parameters.nominal))
     poses = len(np.unique(problem.stop))
     return rank, int(np.ceil((rank + OPTIONS.min_spare_numbers) * poses / (3 * len(problem)))), poses
 
 
-def few_readings(problem):
+def few_readings(problem: DiagnosisProblem) -> str | None:
     """A sentence on how little a diagnosis of few readings finds, None where they are many."""
     numbers, count = 3 * len(problem), len(problem.mechanism.parameters)
     if numbers >= OPTIONS.few_numbers_per_parameter * count:
@@ -57,19 +59,19 @@ def few_readings(problem):
     return f"few readings: {numbers} numbers for {count} parameters of the calibration; {found}"
 
 
-def _is_determined(columns, rank):
+def _is_determined(columns: FloatArray, rank: int) -> bool:
     """Whether numbers with these derivatives (m, 3, p) determine so many combinations of parameters, some to spare."""
     return 3 * len(columns) >= rank + OPTIONS.min_spare_numbers and _rank(columns) == rank
 
 
-def _rank(columns):
+def _rank(columns: FloatArray) -> int:
     """Numerical rank of derivatives (m, 3, p), each parameter by how far it moves what is read."""
     flat = columns.reshape(-1, columns.shape[-1])
     size = np.maximum(np.linalg.norm(flat, axis=0), 1e-300)
     return int(np.linalg.matrix_rank(np.linalg.qr(flat / size, mode="r"), rtol=_RANK_TOLERANCE))
 
 
-def _why_undetermined(problem, rank):
+def _why_undetermined(problem: DiagnosisProblem, rank: int) -> str:
     """Why readings of this rank are too few for a diagnosis and what to do, empty where they are not."""
     numbers, needed = 3 * len(problem), rank + OPTIONS.min_spare_numbers
     if numbers >= needed:
@@ -81,7 +83,7 @@ def _why_undetermined(problem, rank):
     return f"{read}; allowed: at least {needed}: measure {more} more poses {fewer}"
 
 
-def _too_few(problem, name, rows, rank):
+def _too_few(problem: DiagnosisProblem, name: str, rows: BoolArray, rank: int) -> str:
     """Why an effect that has what it needs at some rows (m,) is not tested."""
     what = "what it needs"
     if has_direction(problem.library[name]):

@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 
 from rrru.campaign import measurements as rows
+from rrru.diagnosis.aliases import FloatArray, Row
 from rrru.diagnosis.budget import budget
 from rrru.diagnosis.design.advise import Advice, advise
 from rrru.diagnosis.design.run_limits import StatedLimits
@@ -40,8 +41,9 @@ from rrru.diagnosis.result_notes import (
 )
 from rrru.diagnosis.result_tables import details_of, left_out, left_out_note, parameter_rows, where
 from rrru.diagnosis.settings import GapSettings, Prior
-from rrru.diagnosis.shrink import CLOSED, order_by_share, share_closed, shrink_steps
+from rrru.diagnosis.shrink import CLOSED, ShrinkStep, order_by_share, share_closed, shrink_steps
 from rrru.diagnosis.state import ModelState
+from rrru.diagnosis.terms import EffectTerm
 from rrru.diagnosis.variance_by_factor import worst_spot
 from rrru.diagnosis.verdict import Verdict, decide, why_no_answer, without_answer
 from rrru.errors import ConfigError
@@ -188,11 +190,11 @@ def _joined(notes: Sequence[str]) -> str:
 def _row(
     inference: InferenceResult,
     verdict: Verdict,
-    steps: Sequence,
-    worst_mm: np.ndarray,
+    steps: Sequence[ShrinkStep],
+    worst_mm: FloatArray,
     further: Advice,
     noise_and_excluded: tuple[float | None, pd.DataFrame],
-) -> dict:
+) -> Row:
     """The row of `gap_verdicts` without the campaign.
 
     noise_and_excluded: the stated noise in mm and the rows of `gap_left_out`.
@@ -231,7 +233,9 @@ def _row(
     }
 
 
-def _decide(inference: InferenceResult, prior: Prior) -> tuple[Verdict, InferenceResult, tuple]:
+def _decide(
+    inference: InferenceResult, prior: Prior
+) -> tuple[Verdict, InferenceResult, tuple[tuple[EffectTerm, float], ...]]:
     """Verdict, the inference fitted to it, and its terms with their shares in order.
 
     The probabilities come from the evidence, and cross-validation has a veto. An effect that predicts left-out points

@@ -1,5 +1,6 @@
 """Which effects cause the gap: calibrate, search the best set, fit it on the exact model, search again from there."""
 
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -7,21 +8,24 @@ import numpy as np
 
 from rrru.campaign import noise
 from rrru.campaign.outliers import isolated
+from rrru.diagnosis.aliases import EffectKey, FloatArray
 from rrru.diagnosis.calibrate import calibrate, origin
 from rrru.diagnosis.detectability import with_seen
-from rrru.diagnosis.discrepancy_basis import UNKNOWN
+from rrru.diagnosis.discrepancy_basis import UNKNOWN, Library
 from rrru.diagnosis.drive_spectra import with_orders, with_spectra
 from rrru.diagnosis.evidence import ModelEvidence
 from rrru.diagnosis.heldout import HeldOut
-from rrru.diagnosis.hypothesis import Hypothesis
+from rrru.diagnosis.hypothesis import Answer, Hypothesis
 from rrru.diagnosis.model_fit import EffectModel, ModelFit, fit_model
 from rrru.diagnosis.model_space import ModelSpace
 from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.posterior import Posterior
 from rrru.diagnosis.problem import DiagnosisProblem
-from rrru.diagnosis.state import ModelState
-from rrru.diagnosis.terms import each_leg
+from rrru.diagnosis.settings import Prior
+from rrru.diagnosis.state import LinearizedProblem, ModelState
+from rrru.diagnosis.terms import EffectTerm, each_leg, shape_probabilities
 from rrru.diagnosis.whitened import DISCREPANCY_SCALES, spectrum
+from rrru.effects.protocol import Coordinates
 from rrru.errors import FitError
 from rrru.estimation.noise_model import MIN_FREE_NUMBERS, alike, fit_noise, high_frequency_noise, p_value
 
@@ -51,22 +55,24 @@ class InferenceResult:
     dropped: int = 0
 
     @property
-    def state(self):
+    def state(self) -> ModelState:
         """The ModelState of the fit."""
         return self.fit.state
 
     @cached_property
-    def held_out(self):
+    def held_out(self) -> HeldOut:
         """Predictions of left-out points."""
         return HeldOut(self.problem, self.evidence)
 
-    def with_posterior(self, posterior):
+    def with_posterior(self, posterior: Posterior) -> "InferenceResult":
         """The inference with another posterior and its best hypothesis; the fit stays."""
         hypothesis, level = posterior.best()
         return replace(self, posterior=posterior, hypothesis=hypothesis, level=level)
 
 
-def with_arm(problem, noise_mm=None, noise_rad=None):
+def with_arm(
+    problem: DiagnosisProblem, noise_mm: float | None = None, noise_rad: float | None = None
+) -> DiagnosisProblem:
     """The problem with orientations at the arm that gives them the positions' noise; what is not given is estimated.
 
     What no effect of the library makes passes for noise in an estimate of poses in no order, in positions as in
@@ -82,7 +88,7 @@ def with_arm(problem, noise_mm=None, noise_rad=None):
     return replace(problem, arm_mm=noise_mm / noise_rad)
 
 
-def with_world_scale(problem):
+def with_world_scale(problem: DiagnosisProblem) -> DiagnosisProblem:
     """The problem with reflectors off the robot weighted by the ratio of the residuals of a fit of everything."""
     if not problem.on_world.any() or problem.on_world.all():
         return problem
@@ -96,7 +102,9 @@ def with_world_scale(problem):
     return replace(problem, beside_scale=float(scale))
 
 
-def with_noise(problem, linear, stated_mm):
+def with_noise(
+    problem: DiagnosisProblem, linear: LinearizedProblem, stated_mm: float | None
+) -> tuple[DiagnosisProblem, str]:
     """The problem under the noise that a fit of all columns of a linearisation leaves, and the source of that noise.
 
     "fitted", see `rrru.estimation.noise_model`, or "repeats" where poses that were measured again say clearly less.
@@ -115,7 +123,7 @@ def with_noise(problem, linear, stated_mm):
     return problem.under(model), "fitted"
 
 
-def _noise_columns(problem, linear, known):
+def _noise_columns(problem: DiagnosisProblem, linear: LinearizedProblem, known: bool) -> FloatArray:
     """Columns (m, 3, k) that may explain the readings while the noise is estimated.
 
     All of the library. Where these leave too few numbers: without effects of many coefficients, then each effect in the
@@ -132,17 +140,21 @@ def _noise_columns(problem, linear, known):
     return columns if known else linear.base
 
 
-def _leaves_enough(linear, columns):
+def _leaves_enough(linear: LinearizedProblem, columns: FloatArray) -> bool:
     """Whether columns (m, 3, k) leave enough of the numbers for an estimate of the noise."""
-    return linear.data.size - columns.shape[-1] >= max(MIN_FREE_NUMBERS, OPTIONS.min_free_share * linear.data.size)
+    return bool(
+        linear.data.size - columns.shape[-1] >= max(MIN_FREE_NUMBERS, OPTIONS.min_free_share * linear.data.size)
+    )
 
 
-def _is_searched(coordinates, shape):
+def _is_searched(coordinates: Coordinates, shape: int) -> bool:
     """Whether a shape of an effect was found in these data, see `rrru.diagnosis.drive_spectra`."""
     return coordinates.searched is not None and 0 < coordinates.stated <= shape
 
 
-def _with_significant(problem, linear, columns, searched):
+def _with_significant(
+    problem: DiagnosisProblem, linear: LinearizedProblem, columns: FloatArray, searched: dict[EffectKey, FloatArray]
+) -> FloatArray:
     """Columns (m, 3, k), and those of each shape that was searched for that explain more than noise does.
 
     The best of many orders explains more of pure noise than its number of columns: with it the noise would be found
@@ -151,13 +163,15 @@ def _with_significant(problem, linear, columns, searched):
     """
     for (name, shape), block in searched.items():
         together = np.concatenate([columns, block], axis=-1)
-        level = OPTIONS.max_searched_order_p * problem.library[name].coordinates.weights[shape]
+        level = OPTIONS.max_searched_order_p * shape_probabilities(problem.library[name].coordinates)[shape]
         if _leaves_enough(linear, together) and p_value(linear.data, columns, block) < level:
             columns = together
     return columns
 
 
-def _fewer_blocks(linear, blocks, library):
+def _fewer_blocks(
+    linear: LinearizedProblem, blocks: dict[EffectKey, FloatArray], library: Library
+) -> Iterator[dict[EffectKey, FloatArray]]:
     """Blocks of columns by (effect, shape), in steps fewer of them."""
     yield blocks
     few = {key: columns for key, columns in blocks.items() if not library[key[0]].coordinates.broad}
@@ -167,22 +181,22 @@ def _fewer_blocks(linear, blocks, library):
     yield {key: columns for key, columns in fitting.items() if key[0] not in UNKNOWN}
 
 
-def _best_shapes(linear, blocks):
+def _best_shapes(linear: LinearizedProblem, blocks: dict[EffectKey, FloatArray]) -> dict[EffectKey, FloatArray]:
     """For each effect the block of columns with the smallest residuals together with the calibration."""
     basis, _ = np.linalg.qr(linear.base.reshape(linear.data.size, -1))
-    best = {}
+    best: dict[str, tuple[float, EffectKey]] = {}
     for key, columns in blocks.items():
         flat = columns.reshape(linear.data.size, -1)
         flat = flat - basis @ (basis.T @ flat)
         size = np.maximum(np.linalg.norm(flat, axis=0), 1e-300)
         coefficients = np.linalg.lstsq(flat / size, linear.data.ravel(), rcond=1e-9)[0]
         explained = float(((flat / size @ coefficients) ** 2).sum())
-        if explained > best.get(key[0], (-np.inf, None))[0]:
+        if explained > (best[key[0]][0] if key[0] in best else -np.inf):
             best[key[0]] = explained, key
     return {key: blocks[key] for _, key in best.values()}
 
 
-def _few(problem, calibrated):
+def _few(problem: DiagnosisProblem, calibrated: ModelState) -> tuple[LinearizedProblem, FloatArray]:
     """The linearisation about a calibration, and the columns (m, 3, k) of all effects with few coefficients.
 
     Where these would leave less than a third of the numbers free, the calibration's columns alone.
@@ -193,7 +207,7 @@ def _few(problem, calibrated):
     return linear, (columns if columns.shape[-1] <= 2 * len(problem) else linear.base)
 
 
-def infer(problem, prior, stated=KNOWN):
+def infer(problem: DiagnosisProblem, prior: Prior, stated: str = KNOWN) -> InferenceResult:
     """InferenceResult of a problem; stated: whether its noise is KNOWN, STATED within limits, or UNKNOWN_NOISE."""
     total = problem.count
     for cleaning in range(OPTIONS.max_outlier_rounds + 1):
@@ -216,7 +230,7 @@ def infer(problem, prior, stated=KNOWN):
     return replace(inference, dropped=total - problem.count)
 
 
-def with_effects(inference, effects):
+def with_effects(inference: InferenceResult, effects: Collection[str]) -> InferenceResult:
     """The inference with hypothesis and fit of exactly the named effects; the posterior stays."""
     same = inference.hypothesis.effects == frozenset(effects)
     known = (inference.hypothesis, inference.level) if same else inference.posterior.best_of(frozenset(effects))
@@ -234,7 +248,13 @@ def with_effects(inference, effects):
     return replace(inference, problem=problem, hypothesis=hypothesis, level=level, fit=fit)
 
 
-def fit_hypothesis(problem, evidence, starts, chosen, known=None):
+def fit_hypothesis(
+    problem: DiagnosisProblem,
+    evidence: ModelEvidence,
+    starts: Iterable[ModelState],
+    chosen: Answer,
+    known: ModelFit | None = None,
+) -> ModelFit:
     """ModelFit of a hypothesis at a level (an index), under the priors that the evidence has chosen for it.
 
     It is fitted to the readings at which all its effects have what they need. Where one value for all legs is probable
@@ -252,11 +272,13 @@ def fit_hypothesis(problem, evidence, starts, chosen, known=None):
 class _Linearization:
     """Problem, columns and noise at a state, with the harmonics and spectra that the residuals show there."""
 
-    def __init__(self, stated, stated_mm):
+    def __init__(self, stated: str, stated_mm: float) -> None:
         self._stated, self._stated_mm = stated, stated_mm
-        self._source = None
+        self._source: str | None = None
 
-    def at(self, problem, state, terms=()):
+    def at(
+        self, problem: DiagnosisProblem, state: ModelState, terms: Sequence[EffectTerm] = ()
+    ) -> tuple[DiagnosisProblem, LinearizedProblem, str]:
         """Problem with harmonics and noise, its linearisation at a state with hypothesis terms, source of the noise."""
         linear = problem.linearise(state)
         problem, orders = with_orders(problem, linear, terms)
@@ -270,19 +292,20 @@ class _Linearization:
         # many columns take long to be projected out, and leave the same residuals at every state
         if self._source and any(effect.coordinates.broad for effect in problem.library.values()):
             return problem, linear, self._source
-        with_found, self._source = with_noise(problem, linear, self._stated_mm if self._stated == STATED else None)
-        return with_found, linear, self._source
+        with_found, source = with_noise(problem, linear, self._stated_mm if self._stated == STATED else None)
+        self._source = source
+        return with_found, linear, source
 
 
-def _is_nonlinear(problem, linear, state, fitted):
+def _is_nonlinear(problem: DiagnosisProblem, linear: LinearizedProblem, state: ModelState, fitted: ModelState) -> bool:
     """Whether the exact model at a fitted state without shapes differs from the linearisation about a state."""
     predicted = linear.data - linear.base @ (fitted.deviations - state.deviations)
     predicted = predicted - sum(linear.columns[key] @ numbers for key, numbers in fitted.effects.items())
     difference = np.sqrt(((problem.residual(fitted) - predicted) ** 2).mean())
-    return difference > OPTIONS.max_nonlinearity_per_noise * problem.noise_mm
+    return bool(difference > OPTIONS.max_nonlinearity_per_noise * problem.noise_mm)
 
 
-def _rounds(problem, calibrated, prior, stated):
+def _rounds(problem: DiagnosisProblem, calibrated: ModelState, prior: Prior, stated: str) -> InferenceResult:
     """Search and fit in turn until a hypothesis is the best one again."""
     linearization, seen, start = _Linearization(stated, problem.noise_mm), set(), origin(problem)
     problem, linear, source = linearization.at(problem, calibrated)
@@ -291,10 +314,10 @@ def _rounds(problem, calibrated, prior, stated):
     calibrated = state = fit.state
     evidence = problem.evidence(linear)
     small = np.sqrt((linear.data**2).mean()) < OPTIONS.max_small_gap_per_noise * problem.noise_mm
-    hypothesis = None
+    terms: tuple[EffectTerm, ...] = ()
     for _ in range(OPTIONS.max_search_rounds):
         space = ModelSpace(evidence.on_library(), prior)
-        first, confirmed = space.search(hypothesis.terms if hypothesis else ()), False
+        first, confirmed = space.search(terms), False
         posterior = space.posterior([first])
         while True:
             hypothesis, level = posterior.best()
@@ -312,6 +335,7 @@ def _rounds(problem, calibrated, prior, stated):
                 break
             # an answer is accepted once a search from the other end has found nothing better
             posterior, confirmed = space.confirmed(first), True
+        terms = hypothesis.terms
         if ended:
             break
         seen.add(frozenset(hypothesis.terms))
@@ -330,7 +354,7 @@ def _rounds(problem, calibrated, prior, stated):
         evidence = problem.evidence(linear)
     else:
         space = ModelSpace(evidence.on_library(), prior)
-        first, confirmed = space.search(hypothesis.terms), False
+        first, confirmed = space.search(terms), False
     if not confirmed:
         posterior = space.confirmed(first)
     hypothesis, level = posterior.best()

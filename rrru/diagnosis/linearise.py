@@ -1,15 +1,26 @@
 """The model of a problem linearised about a state: derivatives by calibration, effects, their shapes and the drives."""
 
+from __future__ import annotations
+
+from collections.abc import Iterable
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rrru.diagnosis.aliases import EffectKey, FloatArray, WeightStep
 from rrru.diagnosis.state import LinearizedProblem, ModelState
 from rrru.effects.protocol import is_compliant
 from rrru.errors import FitError
+from rrru.kinematics.parameter_jacobian import TwistMap
+
+if TYPE_CHECKING:
+    from rrru.diagnosis.problem import DiagnosisProblem
 
 
-def linearised(problem, state, keys=None):
+def linearised(
+    problem: DiagnosisProblem, state: ModelState, keys: Iterable[EffectKey] | None = None
+) -> LinearizedProblem:
     """The model of a problem linearised about a state; raises FitError where the state's model has no pose at a point.
 
     keys: (effect, shape) pairs to make columns for, by default all.
@@ -37,15 +48,15 @@ def linearised(problem, state, keys=None):
     )
 
 
-def approach_responses(problem, state):
+def approach_responses(problem: DiagnosisProblem, state: ModelState) -> FloatArray:
     """Change (m, 3, K) of the readings by a state's effects where each drive comes from below, not with even odds.
 
     It is of readings where the path does not determine the sense.
     """
-    at, approach = problem.map_of(ModelState(state.deviations, {})), problem.motion.approach
+    at, approach = problem.map_of(ModelState(state.deviations, {})), np.asarray(problem.motion.approach)
     even = np.where(np.isfinite(approach), 0.0, approach)
 
-    def twists(sense):
+    def twists(sense: FloatArray) -> FloatArray | float:
         return replace(problem, motion=replace(problem.motion, approach=sense)).contribution(state).twists
 
     middle, result = twists(even), np.zeros((len(problem), 3, approach.shape[1]))
@@ -56,13 +67,15 @@ def approach_responses(problem, state):
     return result
 
 
-def _by_shape(problem, at, key, state):
+def _by_shape(
+    problem: DiagnosisProblem, at: TwistMap, key: EffectKey, state: ModelState
+) -> tuple[FloatArray, tuple[tuple[str, float, float], ...]]:
     """`LinearizedProblem.shape_columns` and `shape_steps` of one effect of the state."""
-    shape, effect = state.shape(problem.library, key), problem.library[key[0]]
+    shape = state.shape(problem.library, key)
     present = state.contribution(problem.library, key, problem.motion)
     columns, steps = [], []
     for name, value in shape.items():
-        stepped = effect.doubted(name, value)
+        stepped = problem.effects[key[0]].doubted(name, value)
         if stepped != value:
             other = state.contribution(problem.library, key, problem.motion, shape=dict(shape) | {name: stepped})
             columns.append(problem.of_rows(at.move((other - present).twists)))
@@ -71,9 +84,12 @@ def _by_shape(problem, at, key, state):
     return np.stack(columns, axis=-1) if columns else nothing, tuple(steps)
 
 
-def _by_weight(problem, at, state, columns):
+def _by_weight(
+    problem: DiagnosisProblem, at: TwistMap, state: ModelState, columns: dict[EffectKey, FloatArray]
+) -> tuple[dict[EffectKey, FloatArray], tuple[WeightStep, ...]]:
     """`LinearizedProblem.by_weight` of columns, and its `weight_steps`."""
-    weight, made = problem.weight(state), {key: [] for key in columns if is_compliant(problem.library[key[0]])}
+    weight = problem.weight(state)
+    made: dict[EffectKey, list[FloatArray]] = {key: [] for key in columns if is_compliant(problem.library[key[0]])}
     nuisance_sd = {name: sd for name, sd in problem.nuisance_sd.items() if sd}
     steps = [(name, weight[name], weight[name] + sd, -weight[name] / sd) for name, sd in nuisance_sd.items()]
     for name, _, stepped, _ in steps:
@@ -83,7 +99,7 @@ def _by_weight(problem, at, state, columns):
     return {key: np.concatenate(parts, axis=-1) for key, parts in made.items() if parts}, tuple(steps)
 
 
-def _columns(problem, at, key, state):
+def _columns(problem: DiagnosisProblem, at: TwistMap, key: EffectKey, state: ModelState) -> FloatArray:
     """Derivative (n, 3, c) by the coordinates of one effect: secants over their present or typical size."""
     functions = problem.library[key[0]].along_drives
     if functions is not None:

@@ -12,11 +12,13 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+import numpy.typing as npt
 
 from rrru.cache import last_cached
+from rrru.diagnosis.aliases import EffectKey, FloatArray
 from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.payload_nuisance import WEIGHT
-from rrru.diagnosis.problem import GEOMETRY
+from rrru.diagnosis.problem import GEOMETRY, DiagnosisProblem
 from rrru.diagnosis.state import ModelState
 from rrru.diagnosis.terms import EACH, EffectTerm, spread
 from rrru.diagnosis.whitened import discrepancy_scales, spectrum
@@ -24,10 +26,11 @@ from rrru.effects.protocol import Contribution, is_compliant
 from rrru.errors import FitError
 from rrru.estimation.estimate import Estimate
 from rrru.estimation.explain import explain_end
-from rrru.estimation.noise_model import NoiseModel
+from rrru.estimation.noise_model import NoiseModel, Whitening
 from rrru.estimation.parameters import Block, Parameters
 from rrru.estimation.problem import Problem
 from rrru.estimation.solver import SolverOptions, solve
+from rrru.kinematics.parameter_jacobian import TwistMap
 
 _SOLVER_OPTIONS = SolverOptions(step_tolerance=OPTIONS.step_tolerance_per_standard_error)
 _MANY_OPTIONS = SolverOptions(OPTIONS.max_iterations_of_many, OPTIONS.step_tolerance_of_many)
@@ -42,44 +45,44 @@ class EffectModel:
     shape parameters, by effect.
     """
 
-    problem: object
+    problem: DiagnosisProblem
     terms: tuple[EffectTerm, ...]
-    scales: np.ndarray
+    scales: FloatArray
     signed: bool = True
 
-    def same_as(self, other):
+    def same_as(self, other: "EffectModel") -> bool:
         """Whether this is the same model of the same problem under the same priors as another EffectModel."""
         same = self.problem is other.problem and self.terms == other.terms and self.signed == other.signed
         return same and np.array_equal(self.scales, other.scales)
 
     @cached_property
-    def _matrices(self):
+    def _matrices(self) -> list[FloatArray]:
         """Matrix (c, k) of each term from its coefficients to the effect's coordinates."""
         return [spread(self.problem.library[term.effect].coordinates, term.legs) for term in self.terms]
 
     @cached_property
-    def shapes(self):
+    def shapes(self) -> dict[str, dict[str, float]]:
         """Anchor values of shape parameters by effect."""
         return {t.effect: dict(self.problem.library[t.effect].coordinates.shapes[t.shape]) for t in self.terms}
 
     @cached_property
-    def _shape_names(self):
+    def _shape_names(self) -> list[tuple[str, str, float]]:
         """(effect, parameter, standard deviation) of every shape parameter that is fitted."""
         shape_sd = [
-            (name, key, abs(self.problem.library[name].doubted(key, value) - value))
+            (name, key, abs(self.problem.effects[name].doubted(key, value) - value))
             for name, shape in self.shapes.items()
             for key, value in shape.items()
         ]
         return [named for named in shape_sd if named[2] > 0.0] if self.signed else []
 
     @cached_property
-    def _weight_names(self):
+    def _weight_names(self) -> list[str]:
         """Names of the errors of payload and tilt, none where no term is compliant."""
         compliant = any(is_compliant(self.problem.library[term.effect]) for term in self.terms)
         return [name for name, sd in self.problem.nuisance_sd.items() if sd] if compliant and self.signed else []
 
     @cached_property
-    def parameters(self):
+    def parameters(self) -> Parameters:
         """The Parameters: geometry, one block a term, "shape" and "weight"."""
         blocks, start = [self.problem.geometry], 0
         for term, matrix in zip(self.terms, self._matrices, strict=True):
@@ -90,7 +93,7 @@ class EffectModel:
             names = [f"{term.effect}_{k}" for k in range(matrix.shape[1])]
             blocks.append(Block.of(term.effect, names, [""] * len(names), self.scales[of_term], bounds=(low, np.inf)))
         if self._shape_names:
-            limits = [self.problem.library[name].parameters[key] for name, key, _ in self._shape_names]
+            limits = [self.problem.effects[name].parameters[key] for name, key, _ in self._shape_names]
             names, units = [f"{name}.{key}" for name, key, _ in self._shape_names], [one.unit for one in limits]
             mean = [self.shapes[name][key] for name, key, _ in self._shape_names]
             bounds = [one.low for one in limits], [one.high for one in limits]
@@ -103,7 +106,7 @@ class EffectModel:
             blocks.append(Block.of(WEIGHT, self._weight_names, units, narrow_sd, 0.0, (low, high), wide_sd=nuisance_sd))
         return Parameters(tuple(blocks))
 
-    def vector(self, state):
+    def vector(self, state: ModelState) -> FloatArray:
         """Parameter vector (p,) of a ModelState; effects that it does not hold have coefficients of zero."""
         values, places = self.parameters.mean.copy(), self.parameters.places
         values[places[GEOMETRY]] = state.deviations
@@ -119,7 +122,7 @@ class EffectModel:
         return self.parameters.clipped(values)
 
     @last_cached
-    def state(self, values):
+    def state(self, values: FloatArray) -> ModelState:
         """The ModelState of a parameter vector (p,)."""
         places = self.parameters.places
         pairs = zip(self.terms, self._matrices, strict=True)
@@ -132,12 +135,12 @@ class EffectModel:
             shapes[WEIGHT] = dict.fromkeys(self.problem.nuisance_sd, 0.0) | dict(found)
         return ModelState(values[places[GEOMETRY]], effects, shapes)
 
-    def residual(self, values):
+    def residual(self, values: FloatArray) -> FloatArray:
         """Readings minus the exact model (m, 3) at parameter values (p,)."""
         return self.problem.residual(self.state(values))
 
     @last_cached
-    def jacobian(self, values):
+    def jacobian(self, values: FloatArray) -> FloatArray:
         """Derivative (m, 3, p) of the residual by the parameters."""
         problem, state = self.problem, self.state(values)
         at = problem.map_of(state)
@@ -149,7 +152,7 @@ class EffectModel:
         blocks += [self._by_weight(at, state, name) for name in self._weight_names]
         return -np.concatenate(blocks, axis=-1)
 
-    def _by_coefficients(self, at, state, term, matrix):
+    def _by_coefficients(self, at: TwistMap, state: ModelState, term: EffectTerm, matrix: FloatArray) -> FloatArray:
         """Derivative (m, 3, k) of the model by a term's coefficients."""
         problem, key = self.problem, (term.effect, term.shape)
         effect, present = problem.library[term.effect], state.effects[key]
@@ -172,10 +175,10 @@ class EffectModel:
             result[..., k] = problem.of_rows(at.move((moved - contribution).twists)) / step
         return result
 
-    def _by_shape(self, at, state, name, key, sd):
+    def _by_shape(self, at: TwistMap, state: ModelState, name: str, key: str, sd: float) -> FloatArray:
         """Derivative (m, 3, 1) of the model by a shape parameter of an effect."""
         problem, effect = self.problem, next(pair for pair in state.effects if pair[0] == name)
-        value, limits = state.shape_values[name][key], problem.library[name].parameters[key]
+        value, limits = state.shape_values[name][key], problem.effects[name].parameters[key]
         step = 1e-3 * sd
         if value + step > limits.high:
             step = -step
@@ -184,7 +187,7 @@ class EffectModel:
         change = moved - problem.contributions(state)[effect]
         return problem.of_rows(at.move(change.twists))[..., None] / step
 
-    def _by_weight(self, at, state, name):
+    def _by_weight(self, at: TwistMap, state: ModelState, name: str) -> FloatArray:
         """Derivative (m, 3, 1) of the model by an error of payload or tilt."""
         problem, step = self.problem, 1e-3 * self.problem.nuisance_sd[name]
         other = state.under(state.weight | {name: state.weight[name] + step})
@@ -207,17 +210,17 @@ class ModelFit:
     level: int
 
     @cached_property
-    def state(self):
+    def state(self) -> ModelState:
         """The ModelState of the estimated values; without fitted shapes where no term has any."""
         state = self.model.state(self.estimate.values)
         return state if self.model.terms else ModelState(state.deviations, {})
 
     @property
-    def terms(self):
+    def terms(self) -> tuple[EffectTerm, ...]:
         """The effect terms."""
         return self.model.terms
 
-    def effect_covariance(self, term):
+    def effect_covariance(self, term: EffectTerm) -> tuple[list[str], FloatArray]:
         """Names of the q fitted shape parameters of a term's effect, and the covariance (k + q, k + q).
 
         The covariance is of the term's k coefficients, and after them of these q parameters.
@@ -225,12 +228,12 @@ class ModelFit:
         chosen, shapes = self._places_of(term)
         return shapes, self.estimate.covariance[np.ix_(chosen, chosen)]
 
-    def effect_numbers(self, term):
+    def effect_numbers(self, term: EffectTerm) -> tuple[FloatArray, FloatArray]:
         """Values (k + q,) of a term's coefficients and its effect's fitted shape parameters, intervals (k + q, 2)."""
         chosen, _ = self._places_of(term)
         return self.estimate.values[chosen], self.estimate.intervals[chosen]
 
-    def _places_of(self, term):
+    def _places_of(self, term: EffectTerm) -> tuple[list[int], list[str]]:
         """Places of a term's coefficients and its effect's fitted shape parameters, and the names of these."""
         parameters, prefix = self.estimate.parameters, f"{term.effect}."
         coefficients = np.arange(len(parameters))[parameters.places[term.effect]]
@@ -239,7 +242,7 @@ class ModelFit:
         return chosen, [name.removeprefix(prefix) for name in shapes]
 
     @property
-    def weight(self):
+    def weight(self) -> list[tuple[str, str, float, float]]:
         """Errors of payload and tilt, each (name, unit, value, standard error), empty where none was fitted."""
         places = self.estimate.parameters.places
         if WEIGHT not in places:
@@ -248,7 +251,7 @@ class ModelFit:
         errors = self.estimate.block_errors(WEIGHT)
         return list(zip(block.names, block.units, self.estimate.block(WEIGHT).tolist(), errors.tolist(), strict=True))
 
-    def one_sigma_steps(self):
+    def one_sigma_steps(self) -> tuple[FloatArray, dict[EffectKey, FloatArray]]:
         """Independent errors of one standard deviation each: geometry (q, p), coordinates (q, c) by key of effect."""
         places, count = self.estimate.parameters.places, len(self.estimate.parameters)
         names = (GEOMETRY, *(term.effect for term in self.terms))
@@ -262,7 +265,7 @@ class ModelFit:
         return steps[:, places[GEOMETRY]], {(t.effect, t.shape): steps[:, places[t.effect]] @ m.T for t, m in pairs}
 
 
-def whitening_of(problem, level):
+def whitening_of(problem: DiagnosisProblem, level: int) -> Whitening:
     """The Whitening of a problem's readings under its noise and the discrepancy of a level (an index)."""
     noise = (problem.noise or NoiseModel.white(problem.noise_mm)).counted
     size = discrepancy_scales(noise)[level] * noise.mean_mm
@@ -270,7 +273,14 @@ def whitening_of(problem, level):
     return noise.whitening(problem.series, discrepancy)
 
 
-def fit_model(problem, starts: Iterable[ModelState], terms: Sequence[EffectTerm] = (), scales=(), level=0, signed=True):
+def fit_model(
+    problem: DiagnosisProblem,
+    starts: Iterable[ModelState],
+    terms: Sequence[EffectTerm] = (),
+    scales: npt.ArrayLike = (),
+    level: int = 0,
+    signed: bool = True,
+) -> ModelFit:
     """ModelFit of a problem's used readings with effect terms, whose coefficients have prior deviations scales (k,).
 
     starts: states, tried in turn until a search from one goes straight to its end; where none does, the first that is
@@ -293,7 +303,12 @@ def fit_model(problem, starts: Iterable[ModelState], terms: Sequence[EffectTerm]
     return ModelFit(model, next(fit for fit in fits if fit.end.cost <= enough), level)
 
 
-def fit_named_effects(problem, names, calibrated, times_typical=OPTIONS.prior_sd_per_typical):
+def fit_named_effects(
+    problem: DiagnosisProblem,
+    names: Iterable[str],
+    calibrated: ModelState,
+    times_typical: float = OPTIONS.prior_sd_per_typical,
+) -> ModelFit:
     """ModelFit of a problem with effects of these names, each in its first shape, chosen beforehand without a search.
 
     calibrated: state to start from; times_typical: of the prior's standard deviation over the typical size. Signs and

@@ -8,6 +8,7 @@ Gaussian Processes for Machine Learning, 2006, sec. 8.3); a and l have the highe
 fold, a fifth of all stretches of five points, is predicted from the others.
 """
 
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,8 +16,13 @@ import pandas as pd
 from scipy.linalg import solve_triangular
 from scipy.spatial.distance import cdist
 
+from rrru.diagnosis.aliases import BoolArray, FloatArray, IntArray
 from rrru.diagnosis.heldout import within
+from rrru.diagnosis.inference import InferenceResult
 from rrru.diagnosis.options import OPTIONS
+from rrru.diagnosis.problem import DiagnosisProblem
+from rrru.diagnosis.state import LinearizedProblem
+from rrru.effects.protocol import Effect
 from rrru.robots.drive_words import drive_words
 
 COLUMNS = ("follows", "explained", "scale", "unit", "rms_mm")
@@ -33,13 +39,13 @@ class _Variable:
     """
 
     follows: str
-    value: np.ndarray
+    value: FloatArray
     unit: str
     drive: int | None = None
     steps: bool = False
 
 
-def remainder_rows(inference):
+def remainder_rows(inference: InferenceResult) -> pd.DataFrame:
     """Rows of `gap_remainder` without the campaign, the variable that explains most first.
 
     explained: share of the mean square, noise taken off, that is predicted at left-out points, 0 to 1; scale: distance
@@ -63,7 +69,9 @@ def remainder_rows(inference):
     return pd.DataFrame(result, columns=COLUMNS)
 
 
-def followed_alike(inference, rows, names):
+def followed_alike(
+    inference: InferenceResult, rows: pd.DataFrame, names: Collection[str]
+) -> tuple[tuple[str, ...], float]:
     """Which of some effects of the fit follow the same variable as the remainder, and the remainder's rms in mm.
 
     rows: of `gap_remainder`; names: of effects. It is for a remainder of which one variable predicts most. An effect is
@@ -93,21 +101,21 @@ def followed_alike(inference, rows, names):
     return tuple(found), float(best["rms_mm"]) if found else 0.0
 
 
-def _without_calibration(values, linear, rows):
+def _without_calibration(values: FloatArray, linear: LinearizedProblem, rows: BoolArray) -> FloatArray:
     """Residuals of values (m, 3) at some rows after a plain least-squares calibration there."""
     chosen = values[rows]
     columns = linear.base[rows].reshape(chosen.size, -1)
     size = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
     fitted = columns / size @ np.linalg.lstsq(columns / size, chosen.ravel(), rcond=1e-9)[0]
-    return chosen - fitted.reshape(chosen.shape)
+    return np.asarray(chosen - fitted.reshape(chosen.shape))
 
 
-def _depends_on(effect, follows):
+def _depends_on(effect: Effect, follows: str) -> bool:
     """Whether an effect depends on the variable, in words, and on no other except those that it determines."""
     return "time_s" in effect.needs if follows == "the time" else not effect.needs
 
 
-def _variables(problem, rows):
+def _variables(problem: DiagnosisProblem, rows: BoolArray) -> list[_Variable]:
     """The variables that may be followed at some rows (m,) of a problem, those that do not change left out."""
     motion, at = problem.motion, problem.at[rows]
     words, units = drive_words(problem.mechanism), problem.mechanism.parts.units
@@ -126,26 +134,30 @@ def _variables(problem, rows):
     return [one for one in found if np.isfinite(one.value).all() and np.ptp(one.value, axis=0).max() > 0.0]
 
 
-def _predicted(variable, left, drive, fold, noise_mm):
+def _predicted(
+    variable: _Variable, left: FloatArray, drive: FloatArray, fold: IntArray, noise_mm: float
+) -> tuple[FloatArray, float]:
     """What a function of a variable predicts (m, 3) of the rows left out in each fold, and its scale.
 
     left (m, 3): the remainder; fold (m,): of its rows; drive (m, 3, K): derivative by the actuator values.
     """
-    best = -np.inf, None, np.nan
+    highest, best = -np.inf, None
     size = float(np.sqrt((left**2).mean()))
     for scale, functions in _functions(variable):
         design = _design(variable, functions, drive)
         unit = size / max(float(np.sqrt((design**2).sum(axis=-1).mean())), 1e-300)
-        problem = _Regression(design * unit, left, noise_mm)
+        regression = _Regression(design * unit, left, noise_mm)
         for amplitude in _AMPLITUDES:
-            evidence = problem.log_evidence(amplitude)
-            if evidence > best[0]:
-                best = evidence, (problem, amplitude), scale
-    problem, amplitude = best[1]
-    return problem.left_out(fold, amplitude), best[2]
+            evidence = regression.log_evidence(amplitude)
+            if evidence > highest:
+                highest, best = evidence, (regression, amplitude, scale)
+    # a variable that changes has functions of finite evidence
+    assert best is not None
+    regression, amplitude, scale = best
+    return regression.left_out(fold, amplitude), scale
 
 
-def _design(variable, functions, drive):
+def _design(variable: _Variable, functions: FloatArray, drive: FloatArray) -> FloatArray:
     """What functions (m, f) of a variable make of the positions (m, 3, k); drive (m, 3, K): derivative by drives."""
     if variable.steps:
         return drive * functions[:, None, :]
@@ -157,7 +169,7 @@ def _design(variable, functions, drive):
     return (functions[:, None, None, :] * np.eye(3)[:, :, None]).reshape(len(functions), 3, -1)
 
 
-def _functions(variable):
+def _functions(variable: _Variable) -> Iterator[tuple[float, FloatArray]]:
     """Pairs of a scale and functions (m, f) at the values, whose independent unit coefficients make the process."""
     value = variable.value
     if variable.steps:
@@ -173,7 +185,7 @@ def _functions(variable):
         yield scale, solve_triangular(factor, across, lower=True).T
 
 
-def _inducing(value):
+def _inducing(value: FloatArray) -> FloatArray:
     """Some of the values (m, d), each the one that is farthest from those before it."""
     value = np.unique(value, axis=0)
     count = min(OPTIONS.remainder_points, len(value))
@@ -187,21 +199,21 @@ def _inducing(value):
 class _Regression:
     """Least squares of coefficients with a normal prior: design (m, 3, f), data (m, 3), noise per number."""
 
-    def __init__(self, design, data, noise_mm):
+    def __init__(self, design: FloatArray, data: FloatArray, noise_mm: float) -> None:
         self._design, self._data, self._variance = design, data, noise_mm**2
         flat = design.reshape(-1, design.shape[-1])
         self._gram, self._moment = flat.T @ flat, flat.T @ data.ravel()
         self._value, self._turned = np.linalg.eigh(self._gram)
         self._value = np.maximum(self._value, 0.0)
 
-    def log_evidence(self, amplitude):
+    def log_evidence(self, amplitude: float) -> float:
         """Log marginal likelihood over that of no coefficients, under their prior deviation."""
         ratio = amplitude**2 / self._variance
         along = self._turned.T @ self._moment
         gained = (along**2 * ratio / (1.0 + ratio * self._value)).sum() / self._variance
         return 0.5 * float(gained - np.log1p(ratio * self._value).sum())
 
-    def left_out(self, fold, amplitude):
+    def left_out(self, fold: IntArray, amplitude: float) -> FloatArray:
         """Predictions (m, 3) of each fold by the others."""
         result, penalty = np.empty_like(self._data), self._variance / amplitude**2 * np.eye(len(self._gram))
         for number in np.unique(fold):

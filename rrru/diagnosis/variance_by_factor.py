@@ -7,8 +7,10 @@ import pandas as pd
 from scipy.spatial import cKDTree
 from scipy.special import chdtri
 
+from rrru.diagnosis.aliases import FloatArray, IntArray, ObjectArray, Row
 from rrru.diagnosis.heldout import resampled_rows
 from rrru.diagnosis.options import OPTIONS
+from rrru.diagnosis.problem import DiagnosisProblem
 from rrru.robots.drive_words import drive_words
 
 # regions are cells of the points' box
@@ -17,7 +19,13 @@ _COLUMNS = ("factor", "level", "points", "rms_mm", "share", "share_low", "share_
 _MORE_COLUMNS = ("drive_rms_rad", "drive_rms_mm", "x_mm", "y_mm", "z_mm")
 
 
-def variance_by_factor(problem, residual_mm, drive, generator, draws=200):
+def variance_by_factor(
+    problem: DiagnosisProblem,
+    residual_mm: FloatArray,
+    drive: FloatArray,
+    generator: np.random.Generator,
+    draws: int = 200,
+) -> pd.DataFrame:
     """Rows of `gap_locate` without the campaign.
 
     residual_mm (m, 3): readings minus calibrated model; drive (m, 3, K): derivative by the actuator values. Shares
@@ -26,7 +34,7 @@ def variance_by_factor(problem, residual_mm, drive, generator, draws=200):
     """
     resampled = resampled_rows(problem, generator, draws)
     components = np.where(problem.on_robot[:, None], residual_mm**2, 0.0)
-    whole = _Whole(components.sum(axis=1), 3.0 * problem.on_robot, problem.noise_mm**2, resampled)
+    whole = _Whole(components.sum(axis=1), 3.0 * problem.on_robot.astype(float), problem.noise_mm**2, resampled)
     rows = []
     for name, levels in _levels(problem).items():
         for level in pd.unique(levels[(levels != "") & problem.on_robot]):
@@ -41,15 +49,15 @@ def variance_by_factor(problem, residual_mm, drive, generator, draws=200):
     return pd.DataFrame(rows).reindex(columns=[*_COLUMNS, *_MORE_COLUMNS])
 
 
-def worst_spot(position_mm, residual_mm):
+def worst_spot(position_mm: FloatArray, residual_mm: FloatArray) -> FloatArray:
     """Point (3,) of the n points around which the residual's mean square over its neighbours is largest."""
     count = min(OPTIONS.worst_spot_neighbours, len(position_mm))
     _, near = cKDTree(position_mm).query(position_mm, k=count)
     squares = (residual_mm**2).sum(axis=1)
-    return position_mm[int(squares[near.reshape(len(position_mm), count)].mean(axis=1).argmax())]
+    return np.asarray(position_mm[int(squares[near.reshape(len(position_mm), count)].mean(axis=1).argmax())])
 
 
-def drive_errors(residual_mm, drive):
+def drive_errors(residual_mm: FloatArray, drive: FloatArray) -> FloatArray:
     """Errors (n, K) of the actuator values that would make residuals (n, k), the smallest where K is above k.
 
     drive (n, k, K): derivative of what was read by the actuator values.
@@ -63,12 +71,12 @@ class _Whole:
     (draws, n).
     """
 
-    squares: np.ndarray
-    freedom: np.ndarray
+    squares: FloatArray
+    freedom: FloatArray
     variance: float
-    resampled: np.ndarray
+    resampled: IntArray
 
-    def row(self, factor, level, part, freedom):
+    def row(self, factor: str, level: str, part: FloatArray, freedom: FloatArray) -> Row:
         """One row: share of a part (n,) of the squares, of so many components (n,)."""
         excess, total = part - freedom * self.variance, self.squares - self.freedom * self.variance
         drawn_total = total[self.resampled].sum(axis=1)
@@ -91,7 +99,7 @@ class _Whole:
         }
 
 
-def _levels(problem):
+def _levels(problem: DiagnosisProblem) -> dict[str, ObjectArray]:
     """Level (n,) of each point by factor; an empty text where it is unknown."""
     frame, position, rate = (
         problem.points,
@@ -117,14 +125,16 @@ def _levels(problem):
     return result
 
 
-def _cells(position):
+def _cells(position: FloatArray) -> ObjectArray:
     """Name (n,) of the cell of the points' box that each point lies in."""
     low, size = position.min(axis=0), np.maximum(np.ptp(position, axis=0), 1e-9)
     index = np.minimum((position - low) / size * _CELLS, np.array(_CELLS) - 1).astype(int)
     return np.array([f"x{i + 1} y{j + 1} z{k + 1}" for i, j, k in index], dtype=object)
 
 
-def _drive_rows(problem, residual_mm, drive, resampled):
+def _drive_rows(
+    problem: DiagnosisProblem, residual_mm: FloatArray, drive: FloatArray, resampled: IntArray
+) -> list[Row]:
     """Rows of the factor drive: shares of the squared errors of the drives."""
     residual_mm, drive = problem.by_point(residual_mm), problem.by_point(drive)
     errors, number = drive_errors(residual_mm, drive), np.flatnonzero(problem.used)
