@@ -36,7 +36,7 @@ from benchmarks.harness import RESULTS
 from benchmarks.virtual_campaigns import ROBOTS, SCENES, draw_truth, exact_readings, measure, virtual_campaign
 from rrru.campaign.measurements import series
 from rrru.diagnosis.diagnose import MeasuredRobot, diagnose, with_wide_bounds
-from rrru.diagnosis.make_problem import make_case
+from rrru.diagnosis.make_problem import make_diagnosis_problem
 from rrru.diagnosis.problem import GEOMETRY
 from rrru.diagnosis.settings import GapSettings
 from rrru.errors import FitError
@@ -92,16 +92,16 @@ def state_of(campaign, frame, noise_mm, draws=_RESAMPLES):
         float(np.sqrt(expected.mean())),
         found.verdict["gap_after_rms_mm"],
         ",".join(str(term.legs) for term in terms),
-        inference.case.used,
+        inference.problem.used,
         lambda frame: _residual(campaign, frame, inference),
     )
 
 
 def _residual(campaign, frame, inference):
     """Residuals (n, 3) of the corrected model on another table of readings, NaN where a diagnosis rejects them."""
-    case = make_case(frame, with_wide_bounds(campaign.mechanism), campaign.masses, 1.0, {})
-    case = replace(case, library=inference.case.library).standing(inference.state)
-    return np.where(case.used[:, None], case.left(inference.state), np.nan)
+    problem = make_diagnosis_problem(frame, with_wide_bounds(campaign.mechanism), campaign.masses, 1.0, {})
+    problem = replace(problem, library=inference.problem.library).standing(inference.state)
+    return np.where(problem.used[:, None], problem.left(inference.state), np.nan)
 
 
 # --- one draw

@@ -20,7 +20,7 @@ from scipy.spatial.transform import Rotation
 from rrru.campaign import measurements as rows
 from rrru.campaign.plan import make_plan
 from rrru.campaign.trajectories import Line, Spiral
-from rrru.diagnosis.make_problem import make_case
+from rrru.diagnosis.make_problem import make_diagnosis_problem
 from rrru.effects.library import find
 from rrru.effects.motion import standing
 from rrru.effects.protocol import ActiveEffect, is_compliant
@@ -213,9 +213,11 @@ class VirtualCampaign:
 
     @cached_property
     def cases(self):
-        """The Cases of commands and fresh runs, measured without error."""
+        """The DiagnosisProblems of commands and fresh runs, measured without error."""
         tables = self.commands, self.fresh
-        return tuple(make_case(_read_as_commanded(table), self.mechanism, self.masses, 1.0, {}) for table in tables)
+        return tuple(
+            make_diagnosis_problem(_read_as_commanded(table), self.mechanism, self.masses, 1.0, {}) for table in tables
+        )
 
     @cached_property
     def jacobian(self):
@@ -468,9 +470,9 @@ def exact_readings(campaign, truth, fresh=False):
 
     Raises ValueError where the legs do not close.
     """
-    case, robot = campaign.cases[fresh], campaign.mechanism
-    motion, readings, effects = case.motion, case.readings, truth.effects + truth.discrepancy
-    commanded = rows.actuators(case.measurements, robot), rows.command(case.measurements)
+    problem, robot = campaign.cases[fresh], campaign.mechanism
+    motion, readings, effects = problem.motion, problem.readings, truth.effects + truth.discrepancy
+    commanded = rows.actuators(problem.measurements, robot), rows.command(problem.measurements)
     bearing = robot.orients and any(is_compliant(active.effect) for active in effects)
     for _ in range(_ROUNDS_OF_LOADS if bearing else 1):
         twists = robot.twists(truth.deviations) + _twists(effects, motion, truth.payload)
@@ -478,7 +480,7 @@ def exact_readings(campaign, truth, fresh=False):
         if bearing:
             at = standing(robot, commanded, (poses, twists), readings is not None)
             # as in the diagnosis: changes of the loads by the payload are evaluated at the nominal poses
-            motion = replace(case.motion_at(at), load_slopes=lambda: case.motion.slopes)
+            motion = replace(problem.motion_at(at), load_slopes=lambda: problem.motion.slopes)
     if not poses.closed.all():
         raise ValueError(f"{campaign.robot}: {(~poses.closed).sum()} poses do not close with the drawn errors")
     return robot.measured(poses, twists, readings) if readings is not None else robot.measured(poses, twists)

@@ -10,9 +10,13 @@ turn back on the way: it comes from the side of its last stretch. A drive that d
 side of arrival.
 """
 
+from __future__ import annotations
+
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise, product
 from math import comb
+from typing import TYPE_CHECKING
 
 import numba
 import numpy as np
@@ -21,10 +25,18 @@ from scipy.spatial.transform import Rotation
 from rrru.campaign.driven_path import STEPS
 from rrru.campaign.outliers import NORMAL_MEDIAN
 from rrru.campaign.stated_motion import DRIVES, TOOL
+from rrru.diagnosis.aliases import BoolArray, FloatArray, IntArray
+from rrru.diagnosis.discrepancy_basis import TestedEffect
 from rrru.diagnosis.options import OPTIONS
+from rrru.diagnosis.state import ModelState
 from rrru.effects.backlash import play
+from rrru.effects.motion import Course
 from rrru.effects.protocol import PATH
 from rrru.kinematics.inverse import inverse_kinematics
+from rrru.kinematics.robot import Robot
+
+if TYPE_CHECKING:
+    from rrru.diagnosis.problem import DiagnosisProblem
 
 _ROUNDING = {"rad": OPTIONS.drive_rounding_rad, "mm": OPTIONS.drive_rounding_mm}
 # the next difference, over its deviation for white noise, of a motion with 4 points a period: sin(pi / 4)
@@ -37,7 +49,7 @@ _SHARES = 0.5 * (1.0 - np.cos(np.pi * np.arange(_STEPS + 1) / _STEPS))
 _SAME = 0.01
 
 
-def read_back_jitter(drive, run):
+def read_back_jitter(drive: FloatArray, run: IntArray) -> FloatArray:
     """Standard deviation (K,) of the random error of drive values (n, K) along runs (n,).
 
     The k-th difference of white noise of deviation s has the deviation s sqrt(C(2k, k)); that of a smooth motion
@@ -55,7 +67,7 @@ def read_back_jitter(drive, run):
     return np.quantile(found, 0.25, axis=0, method="lower") if found else np.zeros(np.shape(drive)[1])
 
 
-def _jitter_of_run(drive):
+def _jitter_of_run(drive: FloatArray) -> FloatArray:
     """`read_back_jitter` (K,) of drive values (n, K) of one run."""
     sizes = []
     highest = min(OPTIONS.max_difference_order, len(drive) - OPTIONS.min_differences)
@@ -68,17 +80,17 @@ def _jitter_of_run(drive):
     return result
 
 
-def rest_widths(drive, run, units):
+def rest_widths(drive: FloatArray, run: IntArray, units: Sequence[str]) -> FloatArray:
     """Changes (K,) of drive values (n, K) along runs (n,) that are no motion, in the drives' units."""
     rounding = np.array([_ROUNDING[unit] for unit in units])
     span = np.ptp(drive, axis=0)
     widest = np.array([span[[other == unit for other in units]].max() for unit in units])
     jitter = read_back_jitter(drive, run)
     jitter = np.where(jitter < OPTIONS.max_jitter_per_swing * widest, jitter, 0.0)
-    return np.maximum(OPTIONS.rest_width_per_jitter_sd * jitter, rounding)
+    return np.asarray(np.maximum(OPTIONS.rest_width_per_jitter_sd * jitter, rounding))
 
 
-def at_reversals(course, other_path, widths):
+def at_reversals(course: Course, other_path: FloatArray, widths: FloatArray) -> BoolArray:
     """Rows (n, K) at which a drive reverses: its sense of arrival there is not determined.
 
     course: with drive, path_drive and path_index; other_path (N, K): actuator values along the path by another
@@ -102,7 +114,7 @@ def at_reversals(course, other_path, widths):
 
 
 @numba.njit(cache=True)
-def _reversals(path, width):
+def _reversals(path: FloatArray, width: float) -> BoolArray:
     """Rows (N,) from which on a drive turns back along its path (N,) by more than a width."""
     result = np.zeros(len(path), dtype=np.bool_)
     low = high = path[0]
@@ -118,42 +130,44 @@ def _reversals(path, width):
     return result
 
 
-def estimate_approach(case, state, responses):
-    """The motion's `approach` (n, K) by what a state leaves of a Case's readings.
+def estimate_approach(problem: DiagnosisProblem, state: ModelState, responses: FloatArray) -> FloatArray:
+    """The motion's `approach` (n, K) by what a state leaves of a problem's readings.
 
     Both senses of every drive have equal prior probability. The combinations of the senses at a stop have the odds of
     the likelihood of all that was read there; the expected sense is their mean.
     responses (m, 3, K): change of what is read by a sense of 1 of each drive.
     """
-    approach = case.motion.approach.copy()
+    approach = np.array(problem.motion.approach)
     unknown = np.isfinite(approach)
     # the residual under even odds
-    plain = replace(case, motion=replace(case.motion, approach=np.where(unknown, 0.0, approach)))
-    scale = case.axis_mm
+    plain = replace(problem, motion=replace(problem.motion, approach=np.where(unknown, 0.0, approach)))
+    scale = problem.axis_mm
     left, response = plain.residual(state) / scale, responses / scale[:, None]
     size = np.sqrt((response**2).sum(axis=1)) > OPTIONS.min_approach_response_per_noise
     approach[unknown] = 0.0
-    acting = (unknown[case.at] & size).any(axis=1)
-    for stop in np.unique(case.stop[acting]):
-        here = case.stop == stop
-        drives = np.flatnonzero((unknown[case.at[here]] & size[here]).any(axis=0))
+    acting = (unknown[problem.at] & size).any(axis=1)
+    for stop in np.unique(problem.stop[acting]):
+        here = problem.stop == stop
+        drives = np.flatnonzero((unknown[problem.at[here]] & size[here]).any(axis=0))
         power = (response[here][..., drives] ** 2).sum(axis=(0, 1))
         drives = np.sort(drives[np.argsort(-power, kind="stable")][: OPTIONS.max_jointly_estimated_drives])
         senses = np.array([*product((-1.0, 1.0), repeat=len(drives))])
         lacking = left[here].ravel() - senses @ response[here].reshape(-1, response.shape[-1])[:, drives].T
         log = -0.5 * (lacking**2).sum(axis=1)
         odds = np.exp(log - np.logaddexp.reduce(log))
-        points = np.unique(case.at[here])
+        points = np.unique(problem.at[here])
         approach[points[:, None], drives] = np.where(unknown[points[:, None], drives], odds @ senses, np.nan)
     return approach
 
 
-def has_direction(effect):
+def has_direction(effect: TestedEffect) -> bool:
     """Whether an effect depends on the sense in which the drives arrive."""
     return PATH in effect.needs
 
 
-def paths_between_stops(mechanism, drive, position_mm, between):
+def paths_between_stops(
+    mechanism: Robot, drive: FloatArray, position_mm: FloatArray, between: str | None
+) -> tuple[list[FloatArray], IntArray]:
     """Actuator values (N, K) along everything that is driven, one path for each way that the robot may have taken, and
     their rows (s,) at the stops; `between` as `rrru.campaign.stated_motion.StatedMotion` has it.
 
@@ -165,7 +179,7 @@ def paths_between_stops(mechanism, drive, position_mm, between):
     return [_joined(ways[name](mechanism, drive, position_mm), drive) for name in chosen], index
 
 
-def undetermined_senses(paths, index, run, widths):
+def undetermined_senses(paths: Sequence[FloatArray], index: IntArray, run: IntArray, widths: FloatArray) -> BoolArray:
     """Stops (s, K) at which paths of `paths_between_stops` do not determine from which side a drive comes.
 
     No path determines how the robot got to a run's start, run (s,), nor its motion where its path is unknown. Two paths
@@ -174,10 +188,10 @@ def undetermined_senses(paths, index, run, widths):
     senses = [_senses_of_arrival(path, index, run, widths) for path in paths]
     lost = [np.logical_or.reduceat(np.isnan(path), np.maximum(index - _STEPS + 1, 0)) for path in paths]
     least = np.min([np.abs(sense) for sense in senses], axis=0)
-    return (least < 1.0 - _SAME) | (np.ptp(senses, axis=0) > _SAME) | np.any(lost, axis=0)
+    return np.asarray((least < 1.0 - _SAME) | (np.ptp(senses, axis=0) > _SAME) | np.any(lost, axis=0))
 
 
-def _senses_of_arrival(path, index, run, widths):
+def _senses_of_arrival(path: FloatArray, index: IntArray, run: IntArray, widths: FloatArray) -> FloatArray:
     """Senses (s, K) in which the drives come to stops of runs (s,): 1 from below, -1 from above, less where a drive has
     moved by less than its width (K,) since the run's start or a reversal.
     """
@@ -189,12 +203,12 @@ def _senses_of_arrival(path, index, run, widths):
     return result
 
 
-def _straight_in_drives(_mechanism, drive, _position_mm):
+def _straight_in_drives(_mechanism: Robot, drive: FloatArray, _position_mm: FloatArray) -> FloatArray:
     """Actuator values (s - 1, steps + 1, K) on the ways between stops, straight in the drives."""
     return drive[:-1, None] + _SHARES[:, None] * np.diff(drive, axis=0)[:, None]
 
 
-def _straight_in_tool(mechanism, drive, position_mm):
+def _straight_in_tool(mechanism: Robot, drive: FloatArray, position_mm: FloatArray) -> FloatArray:
     """Actuator values (s - 1, steps + 1, K) on the ways between stops, on straight lines of the tool.
 
     Its orientation turns about one axis. NaN where the nominal robot cannot reach.
@@ -214,18 +228,18 @@ def _straight_in_tool(mechanism, drive, position_mm):
         found = mechanism.inverse(place.reshape(-1, 3)).reshape(shape)
     # both ends agree with the rows, also for a controller that corrects the robot's errors
     found = found + (1.0 - _SHARES[:, None]) * (straight - found)[:, :1] + _SHARES[:, None] * (straight - found)[:, -1:]
-    return found
+    return np.asarray(found)
 
 
-def _turning(turn):
+def _turning(turn: FloatArray) -> FloatArray:
     """Orientations (m, 3, 3) on the ways between those (s, 3, 3) of stops, each way about one axis."""
     start = Rotation.from_matrix(np.repeat(turn[:-1], len(_SHARES), axis=0))
     whole = Rotation.from_matrix(turn[:-1].transpose(0, 2, 1) @ turn[1:]).as_rotvec()
     part = Rotation.from_rotvec((_SHARES[None, :, None] * whole[:, None]).reshape(-1, 3))
-    return (start * part).as_matrix()
+    return np.asarray((start * part).as_matrix())
 
 
-def _joined(ways, drive):
+def _joined(ways: FloatArray, drive: FloatArray) -> FloatArray:
     """The path (N, K) of ways (s - 1, steps + 1, K) from stop to stop at drive values (s, K)."""
     between = np.concatenate([drive[:-1, None], ways[:, 1:-1]], axis=1)
     return np.concatenate([between.reshape(-1, drive.shape[1]), drive[-1:]])

@@ -11,7 +11,11 @@ import numpy as np
 import pandas as pd
 from scipy.special import ndtr
 
+from rrru.diagnosis.aliases import BoolArray, FloatArray
 from rrru.diagnosis.discrepancy_basis import UNKNOWN
+from rrru.diagnosis.evidence import ModelEvidence
+from rrru.diagnosis.hypothesis import Hypothesis
+from rrru.diagnosis.inference import InferenceResult
 from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.terms import signatures, spread
 from rrru.estimation.noise_model import CONTRADICTED, NoiseModel
@@ -20,13 +24,15 @@ COLUMNS = ("part", "kind", "rms_mm", "share", "share_low", "share_high", "probab
 _UNEXPLAINED = "unexplained"
 
 
-def budget(inference, stated_mm, generator, draws):
+def budget(
+    inference: InferenceResult, stated_mm: float | None, generator: np.random.Generator, draws: int
+) -> pd.DataFrame:
     """Rows of `gap_budget` without the campaign; stated_mm: the instrument's noise per axis, None where unknown."""
     squares, products, fitted = _drawn(inference, generator, draws)
-    noise = _noise_parts(inference, stated_mm, generator, draws)
-    residual = inference.case.residual(inference.calibrated)
-    instrument = float(noise.pop("instrument").mean())
-    gap = float((residual[inference.case.on_robot] ** 2).sum(axis=1).mean()) - instrument
+    instrument_mm2, noise = _noise_parts(inference, stated_mm, generator, draws)
+    residual = inference.problem.residual(inference.calibrated)
+    instrument = float(instrument_mm2.mean())
+    gap = float((residual[inference.problem.on_robot] ** 2).sum(axis=1).mean()) - instrument
     posterior = inference.posterior
     unexplained = squares.pop(_UNEXPLAINED)
     rows = [(name, "effect", drawn, posterior.marginal(name)) for name, drawn in squares.items()]
@@ -44,28 +50,32 @@ def budget(inference, stated_mm, generator, draws):
     return pd.DataFrame([_row(*row, total) for row in rows], columns=COLUMNS)
 
 
-def _row(part, kind, squares, probability, total):
+def _row(
+    part: str, kind: str, squares: FloatArray, probability: float, total: float
+) -> tuple[str, str, float, float, float, float, float]:
     """One row of draws (b,) of a mean square, which may be negative where it is a product."""
     mean, (low, high) = float(squares.mean()), np.quantile(squares, OPTIONS.interval_quantiles)
-    share = [one / total if total > 0.0 else 0.0 for one in (mean, min(low, mean), max(high, mean))]
-    return part, kind, float(np.sign(mean) * np.sqrt(abs(mean))), *map(float, share), float(probability)
+    share, least, most = (float(one / total if total > 0.0 else 0.0) for one in (mean, min(low, mean), max(high, mean)))
+    return part, kind, float(np.sign(mean) * np.sqrt(abs(mean))), share, least, most, float(probability)
 
 
-def _drawn(inference, generator, draws):
+def _drawn(
+    inference: InferenceResult, generator: np.random.Generator, draws: int
+) -> tuple[dict[str, FloatArray], dict[tuple[str, str], FloatArray], float]:
     """Draws (b,) of mean squares, of effects and of what is unexplained, by name, and of products of two of them; the
     share of the noise that the calibration absorbs.
     """
-    case, evidence, posterior = inference.case, inference.evidence, inference.posterior
+    problem, evidence, posterior = inference.problem, inference.evidence, inference.posterior
     linear = evidence.linear
-    left = _LeftByCalibration(linear.base, case.on_robot)
-    data, count = left.residual(linear.data.reshape(-1, 1)), int(case.on_robot.sum())
+    left = _LeftByCalibration(linear.base, problem.on_robot)
+    data, count = left.residual(linear.data.reshape(-1, 1)), int(problem.on_robot.sum())
     weights = posterior.weights.ravel()
     counts = np.bincount(generator.choice(len(weights), draws, p=weights / weights.sum()), minlength=len(weights))
-    names = [name for name in case.effects if posterior.marginal(name) > OPTIONS.min_budget_probability]
+    names = [name for name in problem.effects if posterior.marginal(name) > OPTIONS.min_budget_probability]
     squares = {name: np.zeros(draws) for name in (*names, _UNEXPLAINED)}
     products, first = {pair: np.zeros(draws) for pair in combinations(squares, 2)}, 0
     for number in np.flatnonzero(counts):
-        row, level = np.unravel_index(number, posterior.weights.shape)
+        row, level = map(int, np.unravel_index(number, posterior.weights.shape))
         some = slice(first, first + counts[number])
         first = some.stop
         parts = _parts(evidence, posterior.hypotheses[row], level, left, generator, counts[number])
@@ -76,7 +86,7 @@ def _drawn(inference, generator, draws):
                 products[pair][some] = 2.0 * (parts[pair[0]] * parts[pair[1]]).sum(axis=0) / count
         if posterior.unexplained[row, level] and _UNEXPLAINED not in parts:
             beyond = data - sum(parts.values(), np.zeros((len(data), counts[number])))
-            spare = 3.0 * case.noise_mm**2 * (1.0 - left.taken)
+            spare = 3.0 * problem.noise_mm**2 * (1.0 - left.taken)
             squares[_UNEXPLAINED][some] = np.maximum((beyond**2).sum(axis=0) / count - spare, 0.0)
     return squares, products, left.taken
 
@@ -87,17 +97,24 @@ class _LeftByCalibration:
     taken: share of the noise that it absorbs there.
     """
 
-    def __init__(self, columns, counted):
+    def __init__(self, columns: FloatArray, counted: BoolArray) -> None:
         self._basis, _ = np.linalg.qr(columns.reshape(-1, columns.shape[-1]))
         self._counted = np.repeat(counted, 3)
         self.taken = float((self._basis[self._counted] ** 2).sum() / self._counted.sum())
 
-    def residual(self, numbers):
+    def residual(self, numbers: FloatArray) -> FloatArray:
         """Residuals (3n, k) at the readings that count, of numbers (3m, k) at all readings."""
         return numbers[self._counted] - self._basis[self._counted] @ (self._basis.T @ numbers)
 
 
-def _parts(evidence, hypothesis, level, left, generator, count):
+def _parts(
+    evidence: ModelEvidence,
+    hypothesis: Hypothesis,
+    level: int,
+    left: _LeftByCalibration,
+    generator: np.random.Generator,
+    count: int,
+) -> dict[str, FloatArray]:
     """By effect of a hypothesis its part of the gap (3n, count) beyond the calibration, at drawn coefficients.
 
     left: a _LeftByCalibration. Those of discrepancy functions together are the unexplained part.
@@ -110,8 +127,8 @@ def _parts(evidence, hypothesis, level, left, generator, count):
     size, turned = np.linalg.eigh(covariance / np.outer(unit, unit))
     shaken = unit[:, None] * turned * np.sqrt(np.maximum(size, 0.0))
     drawn = mean[:, None] + shaken @ generator.standard_normal((len(mean), count))
-    result, start = {}, 0
-    linear = evidence.linear
+    result: dict[str, FloatArray] = {}
+    start, linear = 0, evidence.linear
     made = signatures(evidence.library, linear, hypothesis.terms)
     for term, columns in zip(hypothesis.terms, made, strict=True):
         coordinates = evidence.library[term.effect].coordinates
@@ -130,11 +147,13 @@ def _parts(evidence, hypothesis, level, left, generator, count):
     return result
 
 
-def _noise_parts(inference, stated_mm, generator, draws):
-    """Draws (b,) of the instrument's mean square, and draws and probability of scatter and runs."""
-    case = inference.case
-    model = case.noise or NoiseModel.white(case.noise_mm)
-    freedom = max(len(case) - inference.evidence.linear.base.shape[-1], 1)
+def _noise_parts(
+    inference: InferenceResult, stated_mm: float | None, generator: np.random.Generator, draws: int
+) -> tuple[FloatArray, dict[str, tuple[FloatArray, float]]]:
+    """Draws (b,) of the instrument's mean square, and by name draws and probability of scatter and runs."""
+    problem = inference.problem
+    model = problem.noise or NoiseModel.white(problem.noise_mm)
+    freedom = max(len(problem) - inference.evidence.linear.base.shape[-1], 1)
     axes = model.axis_mm**2 * (1.0 + np.sqrt(2.0 / freedom) * generator.standard_normal((draws, 3)))
     scatter, probability = np.zeros((draws, 3)), np.nan
     if stated_mm:
@@ -143,8 +162,7 @@ def _noise_parts(inference, stated_mm, generator, draws):
         error = np.sqrt(0.5 / freedom)
         probability = ndtr((np.log(model.axis_mm / stated_mm) - np.log(CONTRADICTED)) / error).max()
     offset = model.drawn_offsets(generator, draws)
-    return {
-        "instrument": (axes - scatter).sum(axis=1),
+    return (axes - scatter).sum(axis=1), {
         "scatter": (scatter.sum(axis=1), probability),
         "runs": (axes.sum(axis=1) * offset, model.offset_probability),
     }

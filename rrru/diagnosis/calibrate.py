@@ -2,23 +2,24 @@
 
 from rrru.calibration.calibrate import estimate_deviations
 from rrru.campaign import measurements as rows
-from rrru.diagnosis.state import State
+from rrru.diagnosis.problem import DiagnosisProblem
+from rrru.diagnosis.state import ModelState
 from rrru.estimation.observations.target_positions import TargetPositions
 from rrru.estimation.starts import starting_values
 
 
-def calibrate(case):
-    """State of the plain calibration of the case's used points; raises FitError where there are too few of them."""
-    return State(estimate_deviations(observations_of(case), geometry=case.geometry).values, {})
+def calibrate(problem: DiagnosisProblem) -> ModelState:
+    """ModelState of the plain calibration of the problem's used points; raises FitError where they are too few."""
+    return ModelState(estimate_deviations(observations_of(problem), geometry=problem.geometry).values, {})
 
 
-def origin(case):
-    """State that the calibration starts from, see `rrru.estimation.starts`."""
-    return State(starting_values(observations_of(case))[0], {})
+def origin(problem: DiagnosisProblem) -> ModelState:
+    """ModelState that the calibration starts from, see `rrru.estimation.starts`."""
+    return ModelState(starting_values(observations_of(problem))[0], {})
 
 
-def observations_of(case):
-    """TargetPositions of the case's used points."""
-    frame = case.measurements[case.used]
-    driven = rows.actuators(frame, case.mechanism), rows.measured(frame), rows.command(frame)
-    return TargetPositions(case.mechanism, *driven, rows.readings(frame, case.arm_mm))
+def observations_of(problem: DiagnosisProblem) -> TargetPositions:
+    """TargetPositions of the problem's used points."""
+    frame = problem.measurements[problem.used]
+    driven = rows.actuators(frame, problem.mechanism), rows.measured(frame), rows.command(frame)
+    return TargetPositions(problem.mechanism, *driven, rows.readings(frame, problem.arm_mm))

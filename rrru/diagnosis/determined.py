@@ -8,85 +8,87 @@ from dataclasses import replace
 
 import numpy as np
 
+from rrru.diagnosis.aliases import BoolArray, FloatArray
 from rrru.diagnosis.approach_direction import has_direction
 from rrru.diagnosis.calibrate import observations_of
 from rrru.diagnosis.options import OPTIONS
+from rrru.diagnosis.problem import DiagnosisProblem
 from rrru.errors import FitError
 
 # singular values of columns of unit length below this share of the largest are rounding
 _RANK_TOLERANCE = 1e-9
 
 
-def require_determined(case, whose=""):
-    """The Case without effects that lack what they need at too many readings.
+def require_determined(problem: DiagnosisProblem, whose: str = "") -> DiagnosisProblem:
+    """The problem without effects that lack what they need at too many readings.
 
     The others have to determine the calibration with `OPTIONS.min_spare_numbers` to spare. whose: first words of a
     message. Raises FitError where all readings together do not.
     """
-    columns = observations_of(case).jacobian(case.mechanism.parameters.nominal)
+    columns = observations_of(problem).jacobian(problem.mechanism.parameters.nominal)
     rank = _rank(columns)
-    if why := _why_undetermined(case, rank):
+    if why := _why_undetermined(problem, rank):
         raise FitError(f"{whose}{why}")
     few = {}
-    for name in case.known:
-        rows = case.complete([name])
+    for name in problem.known:
+        rows = problem.complete([name])
         if rows.mean() < OPTIONS.min_complete_share or not _is_determined(columns[rows], rank):
-            few[name] = _too_few(case, name, rows, rank)
+            few[name] = _too_few(problem, name, rows, rank)
     if not few:
-        return case
-    library = {name: effect for name, effect in case.library.items() if name not in few}
+        return problem
+    library = {name: effect for name, effect in problem.library.items() if name not in few}
     # a discrepancy function is no effect of the library and needs no reason
-    reasons = {name: reason for name, reason in few.items() if name in case.effects}
-    known = {name: points for name, points in case.known.items() if name not in few}
-    return replace(case, library=library, untestable=case.untestable | reasons, known=known)
+    reasons = {name: reason for name, reason in few.items() if name in problem.effects}
+    known = {name: points for name, points in problem.known.items() if name not in few}
+    return replace(problem, library=library, untestable=problem.untestable | reasons, known=known)
 
 
-def poses_needed(case):
-    """Rank of the calibration at a Case's poses, poses that a diagnosis needs at least and poses that were read."""
-    rank = _rank(observations_of(case).jacobian(case.mechanism.parameters.nominal))
-    poses = len(np.unique(case.stop))
-    return rank, int(np.ceil((rank + OPTIONS.min_spare_numbers) * poses / (3 * len(case)))), poses
+def poses_needed(problem: DiagnosisProblem) -> tuple[int, int, int]:
+    """Rank of the calibration at a problem's poses, poses that a diagnosis needs at least and poses that were read."""
+    rank = _rank(observations_of(problem).jacobian(problem.mechanism.parameters.nominal))
+    poses = len(np.unique(problem.stop))
+    return rank, int(np.ceil((rank + OPTIONS.min_spare_numbers) * poses / (3 * len(problem)))), poses
 
 
-def few_readings(case):
+def few_readings(problem: DiagnosisProblem) -> str | None:
     """A sentence on how little a diagnosis of few readings finds, None where they are many."""
-    numbers, count = 3 * len(case), len(case.mechanism.parameters)
+    numbers, count = 3 * len(problem), len(problem.mechanism.parameters)
     if numbers >= OPTIONS.few_numbers_per_parameter * count:
         return None
     found = "an effect is found from about the size detectable_mm in gap_identifiability on"
     return f"few readings: {numbers} numbers for {count} parameters of the calibration; {found}"
 
 
-def _is_determined(columns, rank):
+def _is_determined(columns: FloatArray, rank: int) -> bool:
     """Whether numbers with these derivatives (m, 3, p) determine so many combinations of parameters, some to spare."""
     return 3 * len(columns) >= rank + OPTIONS.min_spare_numbers and _rank(columns) == rank
 
 
-def _rank(columns):
+def _rank(columns: FloatArray) -> int:
     """Numerical rank of derivatives (m, 3, p), each parameter by how far it moves what is read."""
     flat = columns.reshape(-1, columns.shape[-1])
     size = np.maximum(np.linalg.norm(flat, axis=0), 1e-300)
     return int(np.linalg.matrix_rank(np.linalg.qr(flat / size, mode="r"), rtol=_RANK_TOLERANCE))
 
 
-def _why_undetermined(case, rank):
+def _why_undetermined(problem: DiagnosisProblem, rank: int) -> str:
     """Why readings of this rank are too few for a diagnosis and what to do, empty where they are not."""
-    numbers, needed = 3 * len(case), rank + OPTIONS.min_spare_numbers
+    numbers, needed = 3 * len(problem), rank + OPTIONS.min_spare_numbers
     if numbers >= needed:
         return ""
-    poses = len(np.unique(case.stop))
+    poses = len(np.unique(problem.stop))
     more = int(np.ceil((needed - numbers) * poses / numbers))
     read = f"{numbers} numbers read at {poses} poses are too few for a diagnosis of {rank} parameters"
     fewer = "or name a smaller set of parameters under `errors` of the campaign"
     return f"{read}; allowed: at least {needed}: measure {more} more poses {fewer}"
 
 
-def _too_few(case, name, rows, rank):
+def _too_few(problem: DiagnosisProblem, name: str, rows: BoolArray, rank: int) -> str:
     """Why an effect that has what it needs at some rows (m,) is not tested."""
     what = "what it needs"
-    if has_direction(case.library[name]):
+    if has_direction(problem.library[name]):
         what = "the sense in which the drives arrive, unknown at starts of runs and next to reversals of a drive,"
-    points, numbers = len(np.unique(case.at[rows])), 3 * int(rows.sum())
+    points, numbers = len(np.unique(problem.at[rows])), 3 * int(rows.sum())
     least = f"the calibration's {rank} parameters with {OPTIONS.min_spare_numbers} to spare"
     allowed = f"at least {OPTIONS.min_complete_share:.0%} of them whose numbers ({numbers}) determine {least}"
-    return f"{what} is known at {points} of {case.count} points; allowed: {allowed}"
+    return f"{what} is known at {points} of {problem.count} points; allowed: {allowed}"

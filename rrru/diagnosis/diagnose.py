@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 
 from rrru.campaign import measurements as rows
+from rrru.diagnosis.aliases import FloatArray, Row
 from rrru.diagnosis.budget import budget
 from rrru.diagnosis.design.advise import Advice, advise
 from rrru.diagnosis.design.run_limits import StatedLimits
@@ -23,7 +24,7 @@ from rrru.diagnosis.inference import (
     with_effects,
     with_world_scale,
 )
-from rrru.diagnosis.make_problem import make_case
+from rrru.diagnosis.make_problem import make_diagnosis_problem
 from rrru.diagnosis.model_space import explore
 from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.posterior import Posterior
@@ -40,8 +41,9 @@ from rrru.diagnosis.result_notes import (
 )
 from rrru.diagnosis.result_tables import details_of, left_out, left_out_note, parameter_rows, where
 from rrru.diagnosis.settings import GapSettings, Prior
-from rrru.diagnosis.shrink import CLOSED, order_by_share, share_closed, shrink_steps
-from rrru.diagnosis.state import State
+from rrru.diagnosis.shrink import CLOSED, ShrinkStep, order_by_share, share_closed, shrink_steps
+from rrru.diagnosis.state import ModelState
+from rrru.diagnosis.terms import EffectTerm
 from rrru.diagnosis.variance_by_factor import worst_spot
 from rrru.diagnosis.verdict import Verdict, decide, why_no_answer, without_answer
 from rrru.errors import ConfigError
@@ -89,7 +91,7 @@ class Diagnosis:
 
     verdict: dict[str, Any]
     tables: dict[str, pd.DataFrame]
-    state: State
+    state: ModelState
     inference: InferenceResult
     decided: Verdict
 
@@ -118,29 +120,29 @@ def diagnose(
     stated = (KNOWN if robot.noise_known else STATED) if robot.noise_mm else UNKNOWN_NOISE
     nominal, near = with_wide_bounds(robot.mechanism), settings.use_near_singularity
     arm_mm = nominal.angle_arm_mm if rows.has_turns(measurements) else np.nan
-    case = make_case(measurements, nominal, robot.masses, robot.noise_mm or 1.0, library, near, arm_mm)
-    case = replace(case, nuisance_sd=settings.nuisance_sd(case.nuisance_sd))
-    case = require_determined(case, f"campaign {robot.campaign}: " if robot.campaign else "")
+    problem = make_diagnosis_problem(measurements, nominal, robot.masses, robot.noise_mm or 1.0, library, near, arm_mm)
+    problem = replace(problem, nuisance_sd=settings.nuisance_sd(problem.nuisance_sd))
+    problem = require_determined(problem, f"campaign {robot.campaign}: " if robot.campaign else "")
     if rows.has_turns(measurements):
-        case = with_arm(case, robot.noise_mm, robot.noise_rad)
-    case = with_world_scale(case)
+        problem = with_arm(problem, robot.noise_mm, robot.noise_rad)
+    problem = with_world_scale(problem)
     generator = stream(settings.seed, "gap", robot.campaign)
     begin(STEPS[1])
-    verdict, inference, ordered = _decide(infer(case, settings.prior, stated), settings.prior)
+    verdict, inference, ordered = _decide(infer(problem, settings.prior, stated), settings.prior)
     if why := why_no_answer(inference, robot.noise_mm):
         verdict, inference, ordered = without_answer(why), _without_effects(inference, settings.prior), ()
     begin(STEPS[2])
     steps = shrink_steps(inference, [term for term, _ in ordered], generator, settings.draws)
-    case = inference.case
-    residual = case.residual(inference.calibrated)
+    problem = inference.problem
+    residual = problem.residual(inference.calibrated)
     budget_generator = stream(settings.seed, "gap budget", robot.campaign)
     parts = budget(inference, robot.noise_mm or None, budget_generator, settings.draws)
     sizes = parts[parts["kind"] == "effect"].set_index("part")["rms_mm"].to_dict()
     begin(STEPS[3])
     further = advise(inference, verdict, robot.masses, robot.limits, sizes)
     begin(STEPS[4])
-    worst = worst_spot(case.motion.position_mm[case.at][case.on_robot], residual[case.on_robot])
-    excluded = left_out(case, near)
+    worst = worst_spot(problem.motion.position_mm[problem.at][problem.on_robot], residual[problem.on_robot])
+    excluded = left_out(problem, near)
     row = _row(inference, verdict, steps, worst, further, (robot.noise_mm, excluded))
     ranked = further.runs.assign(rank=np.arange(1, len(further.runs) + 1))
     tables = {"gap_budget": parts, "gap_next_runs": ranked, "gap_next_poses": further.poses, "gap_left_out": excluded}
@@ -155,7 +157,7 @@ def diagnose(
 
 def _found(inference: InferenceResult) -> Iterator[str]:
     """Notes on what was found of the robot in addition to its effects."""
-    yield from zero_notes(inference.fit.estimate, inference.case.mechanism)
+    yield from zero_notes(inference.fit.estimate, inference.problem.mechanism)
     yield from bias_notes(inference)
     yield from payload_notes(inference)
     yield from undetermined_payload_notes(inference)
@@ -163,20 +165,20 @@ def _found(inference: InferenceResult) -> Iterator[str]:
 
 def _notes(inference: InferenceResult, stated_mm: float | None, excluded: pd.DataFrame) -> Iterator[str]:
     """What the data lack for a better answer, and what they contradict; excluded: the rows of `gap_left_out`."""
-    case = inference.case
+    problem = inference.problem
     yield from fit_notes(inference)
     yield from posterior_notes(inference.posterior)
-    if case.count < OPTIONS.min_used_share * len(case.used):
-        yield left_out_note(excluded, case.count, len(case.used))
-    if few := few_readings(case):
+    if problem.count < OPTIONS.min_used_share * len(problem.used):
+        yield left_out_note(excluded, problem.count, len(problem.used))
+    if few := few_readings(problem):
         yield few
-    acting = {name for name, _ in inference.state.effects} & case.known.keys()
-    if lacking := case.count - len(np.unique(case.at[case.complete(acting)])):
-        where_not = f"{lacking} of {case.count} points, where the rows do not determine all that is needed"
+    acting = {name for name, _ in inference.state.effects} & problem.known.keys()
+    if lacking := problem.count - len(np.unique(problem.at[problem.complete(acting)])):
+        where_not = f"{lacking} of {problem.count} points, where the rows do not determine all that is needed"
         yield f"{', '.join(sorted(acting))} fitted without {where_not}"
-    yield from noise_notes(case, stated_mm, CONTRADICTED)
-    yield from mass_notes(case)
-    for effect, note in case.untestable.items():
+    yield from noise_notes(problem, stated_mm, CONTRADICTED)
+    yield from mass_notes(problem)
+    for effect, note in problem.untestable.items():
         yield f"{effect} not tested: {note}"
 
 
@@ -188,18 +190,18 @@ def _joined(notes: Sequence[str]) -> str:
 def _row(
     inference: InferenceResult,
     verdict: Verdict,
-    steps: Sequence,
-    worst_mm: np.ndarray,
+    steps: Sequence[ShrinkStep],
+    worst_mm: FloatArray,
     further: Advice,
     noise_and_excluded: tuple[float | None, pd.DataFrame],
-) -> dict:
+) -> Row:
     """The row of `gap_verdicts` without the campaign.
 
     noise_and_excluded: the stated noise in mm and the rows of `gap_left_out`.
     """
     stated_mm, excluded = noise_and_excluded
     found = [] if verdict.no_answer else _found(inference)
-    case, noise = inference.case, inference.case.noise or NoiseModel.white(inference.case.noise_mm)
+    problem, noise = inference.problem, inference.problem.noise or NoiseModel.white(inference.problem.noise_mm)
     return {
         "effects": verdict.label,
         "probability": verdict.probability,
@@ -208,7 +210,7 @@ def _row(
         "confounded_with": ", ".join(verdict.confounded_with),
         "groups": "; ".join(" | ".join(group.names) for group in verdict.groups),
         "searches_apart": inference.posterior.apart,
-        "noise_rms_mm": float(np.sqrt(3.0) * case.noise_mm),
+        "noise_rms_mm": float(np.sqrt(3.0) * problem.noise_mm),
         "gap_rms_mm": steps[0].gap_rms_mm,
         "gap_after_rms_mm": steps[-1].gap_rms_mm,
         **dict(zip(CLOSED, share_closed(steps[0], steps[-1]), strict=True)),
@@ -219,7 +221,7 @@ def _row(
         "noise_correlation": noise.correlation,
         "noise_runs_mm": float(np.sqrt(noise.offset * (noise.axis_mm**2).mean())),
         "noise_from": inference.noise_from,
-        "points": case.count,
+        "points": problem.count,
         "dropped_points": inference.dropped,
         "notes": _joined([*found, *_notes(inference, stated_mm, excluded), *filter(None, [further.limited])]),
         "not_in_model": "",
@@ -231,7 +233,9 @@ def _row(
     }
 
 
-def _decide(inference: InferenceResult, prior: Prior) -> tuple[Verdict, InferenceResult, tuple]:
+def _decide(
+    inference: InferenceResult, prior: Prior
+) -> tuple[Verdict, InferenceResult, tuple[tuple[EffectTerm, float], ...]]:
     """Verdict, the inference fitted to it, and its terms with their shares in order.
 
     The probabilities come from the evidence, and cross-validation has a veto. An effect that predicts left-out points
@@ -242,7 +246,7 @@ def _decide(inference: InferenceResult, prior: Prior) -> tuple[Verdict, Inferenc
     ruled_out: set[str] = set()
     small: frozenset[str] = frozenset()
     while True:
-        verdict = decide(inference.posterior, inference.case.effects, small)
+        verdict = decide(inference.posterior, inference.problem.effects, small)
         fitted = with_effects(inference, verdict.effects)
         least = OPTIONS.max_heldout_loss_nats if verdict.unexplained else -OPTIONS.max_heldout_loss_nats
         worse = {name for name, gain in _gains(fitted).items() if gain < least}
@@ -259,10 +263,10 @@ def _decide(inference: InferenceResult, prior: Prior) -> tuple[Verdict, Inferenc
 def _small(inference: InferenceResult, shares: dict[str, float], verdict: Verdict) -> frozenset[str]:
     """Effects of a verdict that may be a part of the remainder; shares: of the gap, of each effect."""
     # shares are of positions on the robot: reflectors elsewhere may show effects that hardly move these
-    if not verdict.unexplained or inference.case.on_world.any():
+    if not verdict.unexplained or inference.problem.on_world.any():
         return frozenset()
     found = {name for name, share in shares.items() if share < OPTIONS.min_share_with_unexplained}
-    residual = inference.case.residual(inference.calibrated)[inference.case.on_robot]
+    residual = inference.problem.residual(inference.calibrated)[inference.problem.on_robot]
     gap_mm = float(np.sqrt((residual**2).sum(axis=1).mean()))
     alike, left_mm = followed_alike(inference, remainder_rows(inference), tuple(shares))
     least = OPTIONS.min_size_per_remainder * left_mm
@@ -286,7 +290,7 @@ def _without(inference: InferenceResult, ruled_out: set[str], worse: set[str], p
 
 def _without_effects(inference: InferenceResult, prior: Prior) -> InferenceResult:
     """The inference of the calibration alone, with a posterior that has no effect of the library."""
-    names = set(inference.case.effects)
+    names = set(inference.problem.effects)
     return with_effects(inference.with_posterior(_without(inference, names, names, prior)), ())
 
 

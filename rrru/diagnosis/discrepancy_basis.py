@@ -5,13 +5,17 @@ the gap depends on the drives, the time, the place or the load in a way that the
 is "unexplained".
 """
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.polynomial import chebyshev
 
-from rrru.effects.protocol import Coordinates
+from rrru.diagnosis.aliases import FloatArray
+from rrru.effects.protocol import Contribution, Coordinates, Effect, Motion
 from rrru.kinematics.legs import WORLD
+from rrru.kinematics.robot import Robot
 
 _DRIVE_ORDERS, _TIME_ORDERS = (1, 2, 3, 4, 5, 6), (1, 2, 3)
 
@@ -25,9 +29,9 @@ class Unknown:
 
     name: str
     follows: str
-    basis: object
+    basis: Callable[[Any], FloatArray]
     count: int
-    needs: tuple
+    needs: tuple[str, ...]
     per_leg: bool = False
     typical: float = 0.1
 
@@ -37,12 +41,12 @@ class Unknown:
     switches = False
 
     @property
-    def coordinates(self):
+    def coordinates(self) -> Coordinates:
         """One coefficient per function and drive or axis, in the drive's unit or mm."""
         legs = np.zeros((self.drives if self.per_leg else 3) * self.count, dtype=int)
         return Coordinates(np.full(len(legs), self.typical), legs, legs > 0, lambda values, _: values)
 
-    def contribute(self, motion, values):
+    def contribute(self, motion: Motion, values: FloatArray) -> Contribution:
         """Changes under coefficients (drives or axes times k,)."""
         coefficients = np.reshape(values, (-1, self.count))
         if self.per_leg:
@@ -51,40 +55,50 @@ class Unknown:
         shift = self._cached(motion, lambda: self.basis(motion)) @ coefficients.T
         return motion.at({WORLD: np.concatenate([shift, np.zeros_like(shift)], axis=1)})
 
-    def _cached(self, motion, make):
+    def _cached(self, motion: Motion, make: Callable[[], FloatArray]) -> FloatArray:
         """The functions along a motion, computed once."""
         if self.name not in motion.cache:
             motion.cache[self.name] = make()
-        return motion.cache[self.name]
+        functions: FloatArray = motion.cache[self.name]
+        return functions
 
 
-def _unit(values):
+def _unit(values: FloatArray) -> FloatArray:
     """Values (n, ...) mapped to -1 to 1 over their range."""
     low, high = np.nanmin(values, axis=0), np.nanmax(values, axis=0)
-    return 2.0 * (values - low) / np.maximum(high - low, 1e-9) - 1.0
+    return np.asarray(2.0 * (values - low) / np.maximum(high - low, 1e-9) - 1.0)
 
 
-def _of_angle(angle):
+def _chebyshev(values: FloatArray, orders: tuple[int, ...]) -> FloatArray:
+    """Chebyshev functions (n, k) of some orders of values (n,) over their range."""
+    return np.asarray(chebyshev.chebvander(_unit(values), max(orders))[:, orders], dtype=float)
+
+
+def _of_angle(angle: FloatArray) -> FloatArray:
     """Chebyshev functions (n, k) of one drive's values."""
-    return chebyshev.chebvander(_unit(angle), max(_DRIVE_ORDERS))[:, _DRIVE_ORDERS]
+    return _chebyshev(angle, _DRIVE_ORDERS)
 
 
-def _of_time(motion):
+def _of_time(motion: Motion) -> FloatArray:
     """Chebyshev functions (n, k) of the time."""
-    return chebyshev.chebvander(_unit(motion.time_s), max(_TIME_ORDERS))[:, _TIME_ORDERS]
+    return _chebyshev(motion.time_s, _TIME_ORDERS)
 
 
-def _of_place(motion):
+def _of_place(motion: Motion) -> FloatArray:
     """The ten functions (n, 10) of second degree of the commanded position."""
     x, y, z = _unit(motion.position_mm).T
     return np.stack([np.ones_like(x), x, y, z, x * x, y * y, z * z, x * y, y * z, z * x], axis=-1)
 
 
-def _of_load(motion):
+def _of_load(motion: Motion) -> FloatArray:
     """The payload (n, 10) alone and with functions of the place."""
     load = motion.payload_kg / max(np.nanmax(motion.payload_kg), 1e-9)
-    return load[:, None] * _of_place(motion)
+    return np.asarray(load[:, None] * _of_place(motion))
 
+
+# what a term of a hypothesis may be of
+TestedEffect: TypeAlias = Effect | Unknown
+Library: TypeAlias = Mapping[str, TestedEffect]
 
 UNKNOWN = {
     function.name: function
@@ -106,7 +120,7 @@ UNKNOWN = {
 _TYPICAL = {"rad": 1e-4, "mm": 0.01}
 
 
-def unknown_functions(robot):
+def unknown_functions(robot: Robot) -> dict[str, Unknown]:
     """UNKNOWN for a robot's drives; for those of several units the first's typical size."""
     units = robot.parts.units
     return {

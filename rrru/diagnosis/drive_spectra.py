@@ -13,19 +13,24 @@ Astrophysics and Space Science 39, 1976). Drives with a range of s rad resolve o
 below that.
 """
 
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 from scipy.linalg import block_diag, qr
 from scipy.optimize import minimize_scalar
 from scipy.special import gammaln
 
+from rrru.diagnosis.aliases import EffectKey, FloatArray
 from rrru.diagnosis.discrepancy_basis import UNKNOWN
 from rrru.diagnosis.options import OPTIONS
-from rrru.diagnosis.state import State
-from rrru.diagnosis.terms import signatures
+from rrru.diagnosis.problem import DiagnosisProblem
+from rrru.diagnosis.state import LinearizedProblem, ModelState
+from rrru.diagnosis.terms import EffectTerm, signatures
 from rrru.effects.harmonic import drives_of, waves
+from rrru.effects.protocol import Effect, Motion, Search
 
 # places of a drive's measured range: on one turn a wave of order 128 has five and more
 _PLACES = 721
@@ -33,15 +38,17 @@ _PLACES = 721
 _LEAST_POWER = 1e-10
 
 
-def with_spectra(case, linear, terms):
-    """The case whose waves are found and whose spectra are chosen, of effects that no term holds; and keys of these.
+def with_spectra(
+    problem: DiagnosisProblem, linear: LinearizedProblem, terms: Sequence[EffectTerm]
+) -> tuple[DiagnosisProblem, list[EffectKey]]:
+    """The problem whose waves are found and whose spectra are chosen, of effects that no term holds; and keys of these.
 
     linear: about the state of a hypothesis, whose terms are fitted together with them.
     """
-    library, held = dict(case.library), {term.effect for term in terms}
-    open_ones = [e for e in library.values() if (e.coordinates.roots or _is_pending(e)) and e.name not in held]
+    library, held = dict(problem.library), {term.effect for term in terms}
+    open_ones = [e for e in problem.effects.values() if (e.coordinates.roots or e.with_waves) and e.name not in held]
     if not open_ones:
-        return case, []
+        return problem, []
     # a rough function of the drives' values contains all harmonics: together with it none would be left
     known = [term for term in terms if term.effect not in UNKNOWN and not library[term.effect].coordinates.broad]
     nuisance = np.concatenate([linear.base, *signatures(library, linear, known)], axis=-1)
@@ -49,8 +56,8 @@ def with_spectra(case, linear, terms):
     data = _without(linear.data.reshape(-1, 1), basis)[:, 0]
     changed = []
     for effect in open_ones:
-        if _is_pending(effect):
-            found = pursue(data, basis, linear.drive, case.motion.drive[case.at])
+        if effect.with_waves is not None:
+            found = pursue(data, basis, linear.drive, problem.motion.drive[problem.at])
             if found[0]:
                 library[effect.name] = effect.with_waves(*found)
                 changed.append((effect.name, 0))
@@ -63,20 +70,17 @@ def with_spectra(case, linear, terms):
         best, prior_scale, noise = likeliest(data, _without(columns, basis), (roots, of_one), basis.shape[1])
         library[effect.name] = _chosen(effect, _visible(columns, roots[best], prior_scale / noise), prior_scale)
         changed.append((effect.name, 0))
-    return replace(case, library=library), changed
+    return replace(problem, library=library), changed
 
 
-def _is_pending(effect):
-    """Whether an effect's waves are still to be found."""
-    return effect.with_waves is not None
-
-
-def _without(columns, basis):
+def _without(columns: FloatArray, basis: FloatArray) -> FloatArray:
     """Columns (m, k) without what a basis (m, b) makes of them."""
     return columns - basis @ (basis.T @ columns)
 
 
-def pursue(data, basis, drive_effect, drive):
+def pursue(
+    data: FloatArray, basis: FloatArray, drive_effect: FloatArray, drive: FloatArray
+) -> tuple[tuple[tuple[int, float], ...], float]:
     """Pairs (drive, order) of the waves that stand out in data (m,), and the log prior of having chosen just these.
 
     basis (m, b): columns that are fitted together with them; drive_effect (n, 3, K): derivative by the actuator values;
@@ -87,7 +91,7 @@ def pursue(data, basis, drive_effect, drive):
     if not atoms:
         return (), 0.0
 
-    def columns(k, orders):
+    def columns(k: int, orders: FloatArray) -> FloatArray:
         """Columns (m, 2 orders) of waves of a drive that the calibration leaves."""
         return _without(_waves_of(drive_effect, drive, k, orders), basis)
 
@@ -98,7 +102,8 @@ def pursue(data, basis, drive_effect, drive):
     resolved = max(sum(OPTIONS.max_spectrum_order * span / (2.0 * np.pi) for span in reach), 1.0)
     price, freedom = np.log(resolved) + np.log(len(data)), max(len(data) - basis.shape[1], 0)
     # waves_found: an orthonormal basis of the harmonics found
-    found, waves_found, left = [], np.zeros((len(data), 0)), data
+    found: list[tuple[int, float]] = []
+    waves_found, left = np.zeros((len(data), 0)), data
     while len(found) < min(OPTIONS.max_spectrum_waves, len(data) // OPTIONS.min_numbers_per_spectrum_wave):
         gains = ((unit.T @ left) ** 2).reshape(-1, 2).sum(axis=1)
         if not gains.any():
@@ -119,7 +124,9 @@ def pursue(data, basis, drive_effect, drive):
     return tuple(found), float(gammaln(len(found) + 1) - len(found) * np.log(resolved))
 
 
-def _sharpest(left, found, wave, middle, step):
+def _sharpest(
+    left: FloatArray, found: FloatArray, wave: Callable[[float], FloatArray], middle: float, step: float
+) -> float:
     """The order about the middle whose wave reduces the residuals (m,) of the others most.
 
     found (m, h): orthonormal basis of the harmonics found; wave: from orders to columns (m, 2).
@@ -129,33 +136,33 @@ def _sharpest(left, found, wave, middle, step):
     shift, lowest = OPTIONS.max_order_shift_steps * step, OPTIONS.spectrum_orders_per_resolution * step
     bounds = max(middle - shift, lowest), min(middle + shift, OPTIONS.max_spectrum_order)
 
-    def cost(order):
+    def cost(order: float) -> float:
         return -float(((_orthogonal_to(found, wave(order)).T @ left) ** 2).sum())
 
     return float(minimize_scalar(cost, bounds=bounds, method="bounded").x)
 
 
-def _orthogonal_to(found, columns):
+def _orthogonal_to(found: FloatArray, columns: FloatArray) -> FloatArray:
     """An orthonormal basis (m, r) of what columns (m, c) add to orthonormal ones found (m, h)."""
     # twice, against rounding
     basis, size, _ = np.linalg.svd(_without(_without(columns, found), found), full_matrices=False)
     return basis[:, size > OPTIONS.min_new_wave_length]
 
 
-def _unit(columns, least):
+def _unit(columns: FloatArray, least: float) -> FloatArray:
     """Columns (m, c) of unit length, those shorter than the least zero."""
     norm = np.linalg.norm(columns, axis=0)
     return columns / np.where(norm > least, norm, np.inf)
 
 
-def amplitudes(case, state, orders):
+def amplitudes(problem: DiagnosisProblem, state: ModelState, orders: FloatArray) -> FloatArray:
     """Amplitudes (K, g) in rad of waves of orders (g,) of each drive that fit what a state leaves, one at a time.
 
     The calibration's parameters are fitted together with each; NaN where they absorb more than 99 % of a wave.
     """
-    linear, drive = case.linearise(State(state.deviations, {}), []), case.motion.drive[case.at]
+    linear, drive = problem.linearise(ModelState(state.deviations, {}), []), problem.motion.drive[problem.at]
     basis, _ = np.linalg.qr(linear.base.reshape(linear.data.size, -1))
-    left, result = case.residual(state).ravel(), np.full((drive.shape[1], len(orders)), np.nan)
+    left, result = problem.residual(state).ravel(), np.full((drive.shape[1], len(orders)), np.nan)
     for k, found in enumerate(result):
         whole = _waves_of(linear.drive, drive, k, orders)
         columns = _without(whole, basis)
@@ -167,7 +174,7 @@ def amplitudes(case, state, orders):
     return result
 
 
-def _orders(reach):
+def _orders(reach: float) -> FloatArray:
     """Orders that a drive which swings through so many rad is searched for."""
     step = 2.0 * np.pi / reach if reach > 0.0 else np.inf
     if step >= OPTIONS.max_spectrum_order:
@@ -175,20 +182,20 @@ def _orders(reach):
     return np.arange(step, OPTIONS.max_spectrum_order, step / OPTIONS.spectrum_orders_per_resolution)
 
 
-def _waves_of(drive_effect, drive, k, orders):
+def _waves_of(drive_effect: FloatArray, drive: FloatArray, k: int, orders: FloatArray) -> FloatArray:
     """Columns (3 n, 2 orders) of the waves of one drive."""
     made = waves(drive[:, k], orders)
-    return (drive_effect[:, :, k, None] * made[:, None, :]).reshape(3 * len(drive), -1)
+    return np.asarray((drive_effect[:, :, k, None] * made[:, None, :]).reshape(3 * len(drive), -1))
 
 
-def resolved(effect, motion):
+def resolved(effect: Effect, motion: Motion) -> Effect:
     """An effect of several spectra with coordinates that the drives' measured ranges resolve; else the effect itself.
 
     Functions that are smaller than rounding in the whole range are left out: the rest makes the same Gaussian process
     there.
     """
     spectra = effect.coordinates.spectra
-    if not spectra:
+    if not spectra or effect.along_drives is None:
         return effect
     low, high = np.nanmin(motion.drive, axis=0), np.nanmax(motion.drive, axis=0)
     places = low + np.linspace(0.0, 1.0, _PLACES)[:, None] * (high - low)
@@ -204,22 +211,23 @@ def resolved(effect, motion):
         seen = _canonical(turned[:, power > _LEAST_POWER * power[-1]])
         mixtures.append(most[:, None] * seen)
         roots.append([_root(seen.T * _rounded(size[k] / most) ** 2 @ seen) for size in sizes])
-    return _mixed(effect, mixtures, {"spectra": (), "roots": tuple(zip(*roots, strict=True))})
+    changes = {"spectra": (), "roots": tuple(zip(*roots, strict=True))}
+    return _mixed(effect, mixtures, changes)
 
 
-def _rounded(sizes):
+def _rounded(sizes: FloatArray) -> FloatArray:
     """Sizes, zero where they are rounding: arithmetic of the smallest numbers is slow."""
     return np.where(sizes**2 > _LEAST_POWER**2 * (sizes**2).max(), sizes, 0.0)
 
 
-def _root(covariance):
+def _root(covariance: FloatArray) -> FloatArray:
     """A matrix (c, r) with root @ root.T equal to a covariance (c, c) within rounding."""
     variance, turned = np.linalg.eigh(covariance)
     free = variance > _LEAST_POWER * variance[-1]
-    return turned[:, free] * np.sqrt(variance[free])
+    return np.asarray(turned[:, free] * np.sqrt(variance[free]))
 
 
-def _canonical(root):
+def _canonical(root: FloatArray) -> FloatArray:
     """The root (c, r) of a covariance that does not depend on rounding, as eigenvectors of equal values do."""
     # pivoted Cholesky factor; of pivots that are alike, the first one
     preferred = 1.0 - 1e-6 * np.arange(len(root)) / len(root)
@@ -230,9 +238,11 @@ def _canonical(root):
     return result
 
 
-def _mixed(effect, by_drive, changes):
+def _mixed(effect: Effect, by_drive: Sequence[FloatArray], changes: Mapping[str, Any]) -> Effect:
     """An effect with mixtures (c_k, r_k), by drive, of its coordinates; changes: of the Coordinates otherwise."""
     before, functions = effect.coordinates, effect.along_drives
+    # an effect with spectra is linear in functions of the drives
+    assert functions is not None
     mixture, count = block_diag(*by_drive), [its.shape[1] for its in by_drive]
     after = replace(
         before,
@@ -242,13 +252,13 @@ def _mixed(effect, by_drive, changes):
         to_values=lambda values, shape: before.to_values(mixture @ values, shape),
     )
 
-    def along_drives(motion):
+    def along_drives(motion: Motion) -> list[FloatArray]:
         return [whole @ its for whole, its in zip(functions(motion), by_drive, strict=True)]
 
     return replace(effect, coordinates=replace(after, **changes), along_drives=along_drives)
 
 
-def _visible(columns, by_drive, size):
+def _visible(columns: FloatArray, by_drive: Sequence[FloatArray], size: float) -> list[FloatArray]:
     """Mixtures (c_k, r_k) of the columns (m, c) of each drive, independent ones that are not far below the noise.
 
     size: prior s.d. of a unit, in s.d. of the noise.
@@ -263,7 +273,7 @@ def _visible(columns, by_drive, size):
     return result
 
 
-def _chosen(effect, by_drive, prior_scale):
+def _chosen(effect: Effect, by_drive: Sequence[FloatArray], prior_scale: float) -> Effect:
     """An effect of one spectrum, whose coordinates are mixtures (c_k, r_k) by drive of one prior s.d."""
     coordinates = effect.coordinates
     unit = max(np.abs(its).max() for its in by_drive)
@@ -274,7 +284,12 @@ def _chosen(effect, by_drive, prior_scale):
     return _mixed(effect, [its / unit for its in by_drive], changes)
 
 
-def likeliest(data, columns, spectra, fitted):
+def likeliest(
+    data: FloatArray,
+    columns: FloatArray,
+    spectra: tuple[tuple[tuple[FloatArray, ...], ...], tuple[bool, ...]],
+    fitted: int,
+) -> tuple[int, float, float]:
     """Number of the spectrum of highest likelihood, the factor of its sizes, and the noise, of data (m,).
 
     columns (m, c); spectra: `roots` and `of_one` as of `Coordinates`. All drives together and each one alone are tried,
@@ -294,7 +309,7 @@ def likeliest(data, columns, spectra, fitted):
     return max(found)[1:]
 
 
-def _likeliest_factor(gram, moment, square, count):
+def _likeliest_factor(gram: FloatArray, moment: FloatArray, square: float, count: int) -> tuple[float, float, float]:
     """Highest log likelihood over the factor of all coefficients, that factor, and the s.d. of the noise with it.
 
     square: sum of squares with so many degrees of freedom; gram (c, c), moment (c,): of columns of unit coefficients.
@@ -303,13 +318,13 @@ def _likeliest_factor(gram, moment, square, count):
     value, turned = np.linalg.eigh(gram)
     value, power = np.maximum(value, 0.0), (turned.T @ moment) ** 2
 
-    def noise(log_ratio):
+    def noise(log_ratio: float) -> float:
         """Likeliest variance of the noise."""
-        return (square - (power / (np.exp(-2.0 * log_ratio) + value)).sum()) / count
+        return float((square - (power / (np.exp(-2.0 * log_ratio) + value)).sum()) / count)
 
-    def cost(log_ratio):
+    def cost(log_ratio: float) -> float:
         """Minus the log likelihood up to a constant."""
-        return 0.5 * count * np.log(noise(log_ratio)) + 0.5 * np.log1p(np.exp(2.0 * log_ratio) * value).sum()
+        return float(0.5 * count * np.log(noise(log_ratio)) + 0.5 * np.log1p(np.exp(2.0 * log_ratio) * value).sum())
 
     # a ratio of 1 over the root of the mean square is that of as much signal as noise
     middle = 0.5 * np.log(count / max(value.sum(), 1e-300))
@@ -322,12 +337,14 @@ def _likeliest_factor(gram, moment, square, count):
     return -float(fine.fun), float(np.exp(fine.x) * noise_sd), float(noise_sd)
 
 
-def resolution(drive):
+def resolution(drive: FloatArray) -> float:
     """Difference of the orders that drives (n, K) in rad can resolve."""
     return 2.0 * np.pi / float(np.ptp(drive, axis=0).max())
 
 
-def periodogram(data, drive_effect, drive, nuisance, orders):
+def periodogram(
+    data: FloatArray, drive_effect: FloatArray, drive: FloatArray, nuisance: FloatArray, orders: FloatArray
+) -> FloatArray:
     """Reduction (g,) of the sum of squares of data (m, 3) by harmonics of each order (g,).
 
     drive_effect (m, 3, K): derivative by the drives' values; drive (m, K): these in rad; nuisance (m, 3, b):
@@ -347,30 +364,35 @@ def periodogram(data, drive_effect, drive, nuisance, orders):
     return gains
 
 
-def with_orders(case, linear, terms):
-    """The case whose searched effects have the orders that stand out as more shapes, and keys of these (effect, shape).
+def with_orders(
+    problem: DiagnosisProblem, linear: LinearizedProblem, terms: Sequence[EffectTerm]
+) -> tuple[DiagnosisProblem, list[EffectKey]]:
+    """The problem whose searched effects have the outstanding orders as more shapes, and keys of these (effect, shape).
 
     linear: about the state of a hypothesis, whose terms are fitted together with the harmonics.
     """
-    library, added = dict(case.library), []
+    library, added = dict(problem.library), []
     # a rough function of the drives' values contains all harmonics
-    broad = any(case.library[term.effect].coordinates.broad for term in terms)
-    for name, effect in case.library.items():
-        if effect.coordinates.searched is not None and not broad:
+    broad = any(problem.library[term.effect].coordinates.broad for term in terms)
+    for name, effect in problem.effects.items():
+        if (search := effect.coordinates.searched) is not None and not broad:
             # a discrepancy function would absorb what is searched for
             others = [term for term in terms if term.effect != name and term.effect not in UNKNOWN]
-            library[name] = _found(case, linear, effect, others)
+            library[name] = _found(problem, linear, (effect, search), others)
             new = range(len(effect.coordinates.shapes), len(library[name].coordinates.shapes))
             added += [(name, shape) for shape in new]
-    return replace(case, library=library), added
+    return replace(problem, library=library), added
 
 
-def _found(case, linear, effect, others):
-    """An effect with the orders that stand out added to its shapes."""
-    coordinates, search = effect.coordinates, effect.coordinates.searched
-    drives = drives_of(case.mechanism, search.unit)
-    drive, step = case.motion.drive[:, drives][case.at], resolution(case.motion.drive[:, drives][case.used])
-    nuisance = np.concatenate([linear.base, *signatures(case.library, linear, others)], axis=-1)
+def _found(
+    problem: DiagnosisProblem, linear: LinearizedProblem, searched: tuple[Effect, Search], others: Sequence[EffectTerm]
+) -> Effect:
+    """An effect with the orders that stand out added to its shapes; searched: the effect, and what its Search is."""
+    effect, search = searched
+    coordinates = effect.coordinates
+    drives = drives_of(problem.mechanism, search.unit)
+    drive, step = problem.motion.drive[:, drives][problem.at], resolution(problem.motion.drive[:, drives][problem.used])
+    nuisance = np.concatenate([linear.base, *signatures(problem.library, linear, others)], axis=-1)
     orders = np.arange(step, search.highest, step / OPTIONS.orders_per_resolution)
     if len(orders) < 3 or nuisance.shape[-1] > linear.data.size // 2:
         return effect
@@ -382,7 +404,7 @@ def _found(case, linear, effect, others):
         present = [search.order(shape[search.name]) for shape in shapes]
         new = min(abs(order - one) for one in present) > OPTIONS.min_order_distance_ratio * step
         if new and len(shapes) < OPTIONS.max_effect_shapes:
-            shapes.append(shapes[0] | {search.name: search.value(order)})
+            shapes.append(dict(shapes[0]) | {search.name: search.value(order)})
     stated, resolved = coordinates.stated or len(coordinates.shapes), len(orders) / OPTIONS.orders_per_resolution
     probability, order_sd = OPTIONS.stated_order_probability, OPTIONS.order_sd_ratio * step
     weights = [probability / stated] * stated + [(1.0 - probability) / resolved] * (len(shapes) - stated)
@@ -390,7 +412,7 @@ def _found(case, linear, effect, others):
     return replace(effect, coordinates=found)
 
 
-def _vertex(orders, gains, peak):
+def _vertex(orders: FloatArray, gains: FloatArray, peak: int) -> float:
     """The order at the top of the parabola through a peak and its neighbours."""
     before, at, after = gains[peak - 1 : peak + 2]
     curvature = before - 2.0 * at + after

@@ -21,14 +21,19 @@ All sets of effects then compare on the readings at which every effect of the li
 (`ModelEvidence.on_library`); coefficients of a set are those of the readings at which its own effects do.
 """
 
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial, wraps
 from itertools import product
+from typing import Concatenate, ParamSpec, TypeVar
 
 import numpy as np
 
 from rrru.cache import Latest
+from rrru.diagnosis.aliases import BoolArray, FloatArray, Grams, IntArray
+from rrru.diagnosis.discrepancy_basis import Library
 from rrru.diagnosis.evidence_kernels import log_sum_exp
+from rrru.diagnosis.hypothesis import Hypothesis
 from rrru.diagnosis.marginal_problem import Average, MarginalProblem, Prior
 from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.payload_nuisance import (
@@ -39,18 +44,25 @@ from rrru.diagnosis.payload_nuisance import (
     over_cases,
     with_nuisance,
 )
-from rrru.diagnosis.terms import EACH, SAME, spread
+from rrru.diagnosis.state import LinearizedProblem
+from rrru.diagnosis.terms import EACH, SAME, EffectTerm, spread
 from rrru.diagnosis.whitened import DISCREPANCY_SCALES, Whitened
 from rrru.estimation.noise_model import NoiseModel
 
 PRIOR_SCALES = np.array([0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0])
 
 
-def _on_complete(method):
+_P = ParamSpec("_P")
+_R = TypeVar("_R")
+
+
+def _on_complete(
+    method: Callable[Concatenate["ModelEvidence", Sequence[EffectTerm], _P], _R],
+) -> Callable[Concatenate["ModelEvidence", Sequence[EffectTerm], _P], _R]:
     """The method of a set of terms on the readings at which all its effects have what they need."""
 
     @wraps(method)
-    def on_complete(self, terms, *args, **kwargs):
+    def on_complete(self: "ModelEvidence", terms: Sequence[EffectTerm], /, *args: _P.args, **kwargs: _P.kwargs) -> _R:
         return method(self.on_complete(terms), terms, *args, **kwargs)
 
     return on_complete
@@ -66,25 +78,25 @@ class ModelEvidence:
     sets with such effects are those of the rows at which all of them do.
     """
 
-    library: dict
-    linear: object
-    run: np.ndarray
+    library: Library
+    linear: LinearizedProblem
+    run: IntArray
     noise: NoiseModel
     smooth: bool = True
-    known: dict = field(default_factory=dict)
+    known: Mapping[str, BoolArray] = field(default_factory=dict)
 
-    def __len__(self):
+    def __len__(self) -> int:
         return len(self.run)
 
-    def on_library(self):
+    def on_library(self) -> "ModelEvidence":
         """The evidence on the readings at which every effect has what it needs, where all sets compare."""
         return self._on(self.known)
 
-    def on_complete(self, terms):
+    def on_complete(self, terms: Sequence[EffectTerm]) -> "ModelEvidence":
         """The evidence on the readings at which all effects of terms have what they need."""
         return self._on({term.effect for term in terms} & self.known.keys())
 
-    def _on(self, names):
+    def _on(self, names: Collection[str]) -> "ModelEvidence":
         """The evidence on the readings at which some effects have what they need."""
         needed = [self.known[name] for name in sorted(names)]
         if not needed:
@@ -97,33 +109,33 @@ class ModelEvidence:
         return self._parts[key]
 
     @cached_property
-    def _parts(self):
+    def _parts(self) -> dict[bytes, "ModelEvidence"]:
         """Evidences on some of the readings that have been asked for."""
         return {}
 
     @cached_property
-    def _whitened(self):
+    def _whitened(self) -> Whitened:
         """The columns, whitened."""
         return Whitened(self.library, self.linear, self.run, self.noise)
 
     @property
-    def levels(self):
+    def levels(self) -> IntArray:
         """Levels (l,), as indices, that there may be."""
         return np.arange(len(DISCREPANCY_SCALES)) if self.smooth else np.zeros(1, dtype=int)
 
     @cached_property
-    def none(self):
+    def none(self) -> FloatArray:
         """Log evidence (levels,) of no effect at all, -inf at levels that there cannot be."""
         return np.array(
             [self._whitened.gram(k)[2] if k in self.levels else -np.inf for k in range(len(DISCREPANCY_SCALES))]
         )
 
     @cached_property
-    def _priors(self):
+    def _priors(self) -> dict[EffectTerm | str, Prior]:
         """Priors by term and by effect whose shape parameters are fitted, made when they are asked for."""
         return {name: Prior.normal(self._whitened.layout[0][name]) for name in self.linear.shape_columns}
 
-    def _prior(self, term):
+    def _prior(self, term: EffectTerm) -> Prior:
         """The prior of one term's coefficients."""
         if term not in self._priors:
             coordinates, gram = self.library[term.effect].coordinates, np.diag(self._whitened.gram(0)[0])
@@ -146,76 +158,86 @@ class ModelEvidence:
         return self._priors[term]
 
     @_on_complete
-    def projected(self, terms, levels):
+    def projected(self, terms: Sequence[EffectTerm], levels: Sequence[int] | IntArray) -> MarginalProblem:
         """The projected problem of a set of terms at discrepancy levels (indices)."""
         terms = tuple(terms)
         asked = frozenset(terms), tuple(levels)
+        made: tuple[EffectTerm, ...]
+        problem: MarginalProblem
         made, problem = self._problems.of(asked, lambda: (terms, self._projected(terms, levels)))
         if made == terms:
             return problem
         return problem.reordered([made.index(term) for term in terms], self._order(made, terms))
 
     @_on_complete
-    def found(self, terms):
+    def found(self, terms: Sequence[EffectTerm]) -> FloatArray:
         """Coefficients (k,) of a set of terms under weak priors, which make the columns of payload and tilt."""
         terms = tuple(terms)
+        made: tuple[EffectTerm, ...]
+        found: FloatArray
         made, found = self._found.of(frozenset(terms), lambda: (terms, as_found(*self._weakly(terms))))
         return found if made == terms else found[self._order(made, terms)]
 
-    def _weakly(self, terms):
+    def _weakly(self, terms: Sequence[EffectTerm]) -> tuple[MarginalProblem, FloatArray]:
         """The MarginalProblem of terms alone at one level, and weak prior_scales (1, terms)."""
         # payload and tilt are the same at all levels
         problem = self._without_nuisance(terms, partial(self._grams, self.levels[:1]))
         return problem, np.full((1, len(terms)), PRIOR_SCALES[-1])
 
-    def _order(self, made, terms):
+    def _order(self, made: Sequence[EffectTerm], terms: Sequence[EffectTerm]) -> IntArray:
         """Numbers (k,) that coefficients of terms, and after them of their shapes, have in a set in another order."""
-        ends = np.cumsum([0, *(len(prior.index) for prior in self.priors_of(made))])
+        ends = np.cumsum([0, *(len(prior.columns) for prior in self.priors_of(made))])
         numbers = {key: np.arange(*ends[k : k + 2]) for k, key in enumerate(self._keys(made))}
         return np.concatenate([numbers[key] for key in self._keys(terms)])
 
-    def _keys(self, terms):
+    def _keys(self, terms: Sequence[EffectTerm]) -> tuple[EffectTerm | str, ...]:
         """Keys of the priors of terms and after them of their shapes."""
         return *terms, *(term.effect for term in terms if term.effect in self.linear.shape_columns)
 
-    def priors_of(self, terms):
+    def priors_of(self, terms: Sequence[EffectTerm]) -> list[Prior]:
         """Priors of terms and after them of their shapes."""
-        count = len(terms)
-        keys = self._keys(terms)
-        return [*map(self._prior, keys[:count]), *(self._priors[effect] for effect in keys[count:])]
+        return [*map(self._prior, terms), *(self._priors[effect] for effect in self._keys(terms)[len(terms) :])]
 
-    def _projected(self, terms, levels):
+    def _projected(self, terms: Sequence[EffectTerm], levels: Sequence[int] | IntArray) -> MarginalProblem:
         if not self._blocks(terms):
             return self._without_nuisance(terms, partial(self._grams, levels))
         return self._with_nuisance(terms, levels, self.found(terms))
 
-    def _with_nuisance(self, terms, levels, found):
+    def _with_nuisance(
+        self, terms: Sequence[EffectTerm], levels: Sequence[int] | IntArray, found: FloatArray
+    ) -> MarginalProblem:
         """The MarginalProblem of terms, payload and tilt, whose columns are made with coefficients found (k,)."""
         grams, blocks = partial(self._grams, levels), self._blocks(terms)
         problem = self._without_nuisance(terms, grams)
         return with_nuisance(problem, len(terms), blocks, self.linear.weight_steps, found, grams)
 
-    def _without_nuisance(self, terms, grams):
+    def _without_nuisance(self, terms: Sequence[EffectTerm], grams: Grams) -> MarginalProblem:
         """The MarginalProblem of terms without payload and tilt."""
         return MarginalProblem.of(self.priors_of(terms), len(terms), grams)
 
-    def _blocks(self, terms):
+    def _blocks(self, terms: Sequence[EffectTerm]) -> dict[int, tuple[FloatArray, IntArray]]:
         """`_by_weight` of the compliant terms, by their number."""
         return {k: self._by_weight(t) for k, t in enumerate(terms) if (t.effect, t.shape) in self.linear.by_weight}
 
-    def _grams(self, levels, index):
+    def _grams(self, levels: Sequence[int] | IntArray, index: IntArray) -> tuple[FloatArray, FloatArray]:
         """Gram matrices (l, k, k) and moments (l, k) of some columns at levels (indices)."""
         grams = [self._whitened.gram(level) for level in levels]
-        return map(np.array, zip(*((g.take(index, 0).take(index, 1), m[index]) for g, m, _ in grams), strict=True))
+        chosen = [(gram.take(index, 0).take(index, 1), moment[index]) for gram, moment, _ in grams]
+        return np.array([gram for gram, _ in chosen]), np.array([moment for _, moment in chosen])
 
-    def _by_weight(self, term):
+    def _by_weight(self, term: EffectTerm) -> tuple[FloatArray, IntArray]:
         """Matrix from a term's coefficients to coordinates, and derivatives of its columns by payload and tilt."""
         numbers = self._whitened.layout[0][term.effect, term.shape, WEIGHT]
         matrix = spread(self.library[term.effect].coordinates, term.legs)
         return matrix, numbers.reshape(-1, len(matrix))
 
     @_on_complete
-    def over_strengths(self, terms, prior_scales=None, levels=None):
+    def over_strengths(
+        self,
+        terms: Sequence[EffectTerm],
+        prior_scales: Sequence[Sequence[float] | FloatArray] | None = None,
+        levels: Sequence[int] | IntArray | None = None,
+    ) -> tuple[FloatArray, FloatArray]:
         """Log evidence (levels, m) over every combination of the terms' prior scales, and the combinations (m, terms).
 
         prior_scales: grids, one per term, by default PRIOR_SCALES for each; levels (l,): indices, by default all that
@@ -237,7 +259,9 @@ class ModelEvidence:
         return np.moveaxis(value, 1, broad + 1).reshape(len(levels), -1), combinations
 
     @_on_complete
-    def remaining_columns(self, terms, prior_scales, level):
+    def remaining_columns(
+        self, terms: Sequence[EffectTerm], prior_scales: Sequence[float] | FloatArray, level: int
+    ) -> tuple[FloatArray, FloatArray, FloatArray, MarginalProblem | None, FloatArray | None]:
         """All columns other than the broad term of a set, and the problem of the set's others.
 
         Gram matrix (K, K) of all columns; across (K, z): factor of the part that the broad term absorbs, the product
@@ -259,14 +283,21 @@ class ModelEvidence:
             problem = problem.on(*(part[None] for part in average.rest(problem.index)))
         return gram, across, moment, problem, problem.scale(prior_scales[None])[0]
 
-    def _broadest(self, terms):
+    def _broadest(self, terms: Sequence[EffectTerm]) -> int | None:
         """Number of the term of the most coefficients if these are many, None where no term has."""
-        counts = [len(self._prior(term).index) for term in terms]
+        counts = [len(self._prior(term).columns) for term in terms]
         broad = [self.library[term.effect].coordinates.broad for term in terms]
         wide = [count if many else 0 for count, many in zip(counts, broad, strict=True)]
         return int(np.argmax(wide)) if any(wide) else None
 
-    def _with_broad_term(self, broad, grid, problem, prior_scales, levels):
+    def _with_broad_term(
+        self,
+        broad: EffectTerm,
+        grid: Sequence[float] | FloatArray,
+        problem: MarginalProblem | None,
+        prior_scales: FloatArray,
+        levels: Sequence[int] | IntArray,
+    ) -> FloatArray:
         """Log evidence (levels, s, m) of a broad term at the prior scales of a grid (s,) together with other terms.
 
         problem: the others' MarginalProblem at the levels, None where there are none; prior_scales (m, terms): theirs.
@@ -275,42 +306,45 @@ class ModelEvidence:
         none = np.array([self._whitened.gram(level)[2] for level in levels])
         alone = none[:, None, None] + np.array([a.evidence for a in averages]).reshape(len(levels), -1, 1)
         if problem is None:
-            return alone
+            return np.asarray(alone)
         gram, moment = (np.array(part) for part in zip(*(a.rest(problem.index) for a in averages), strict=True))
         found = gained_over_cases(problem.on(gram, moment), prior_scales)
-        return alone + found.reshape(*alone.shape[:2], -1)
+        return np.asarray(alone + found.reshape(*alone.shape[:2], -1))
 
-    def _average(self, term, prior_scale, level):
+    def _average(self, term: EffectTerm, prior_scale: float, level: int) -> Average:
         """The Average over the coefficients of a broad term at a prior scale and a level (an index)."""
 
-        def make():
+        def make() -> Average:
             gram, moment, _ = self._whitened.gram(level)
             prior = self._prior(term)
             # drives on which this term does not act: no set has an effect twice
             apart = self._whitened.layout[0][term.effect, term.shape, EACH]
-            return Average(gram, moment, prior.index, prior.at(prior_scale), apart)
+            return Average(gram, moment, prior.columns, prior.at(prior_scale), apart)
 
-        return self._averages.of((term, float(prior_scale), int(level)), make)
+        average: Average = self._averages.of((term, float(prior_scale), int(level)), make)
+        return average
 
     @cached_property
-    def _problems(self):
+    def _problems(self) -> Latest:
         return Latest(OPTIONS.max_cached_results)
 
     @cached_property
-    def _found(self):
+    def _found(self) -> Latest:
         return Latest(OPTIONS.max_cached_results)
 
     @cached_property
-    def _means(self):
+    def _means(self) -> Latest:
         # the last one: parts of a hypothesis are asked for one after another
         return Latest(1)
 
     @cached_property
-    def _averages(self):
+    def _averages(self) -> Latest:
         return Latest(OPTIONS.max_cached_results)
 
     @_on_complete
-    def over_all_strengths(self, terms, level, start=None):
+    def over_all_strengths(
+        self, terms: Sequence[EffectTerm], level: int, start: Sequence[float] | FloatArray | None = None
+    ) -> tuple[float, FloatArray]:
         """Log evidence of a set of terms at a level (an index) averaged over their prior scales, and the best (terms,).
 
         For one term or two it averages over all combinations; for more over each prior scale about the others' best, as
@@ -326,7 +360,7 @@ class ModelEvidence:
             for k, term in enumerate(terms):
                 # the term that is tried comes last, so that the others' part is cached
                 others = *terms[:k], *terms[k + 1 :]
-                grids = *([prior_scale] for prior_scale in np.delete(best, k)), PRIOR_SCALES
+                grids: list[FloatArray] = [*np.delete(best, k)[:, None], PRIOR_SCALES]
                 value, _ = self.over_strengths((*others, term), grids, [level])
                 best[k], highest = PRIOR_SCALES[value[0].argmax()], value.max()
                 losses[k] = averaged(value, 1)[0] - highest
@@ -335,14 +369,14 @@ class ModelEvidence:
         return highest + losses.sum(), best
 
     @_on_complete
-    def scales(self, terms, prior_scales):
+    def scales(self, terms: Sequence[EffectTerm], prior_scales: Sequence[float] | FloatArray) -> FloatArray:
         """Prior standard deviations (k,) of the terms' coefficients at given prior scales."""
         if not terms:
             return np.zeros(0)
         problem = self.projected(terms, [0])
-        return problem.scale(np.asarray(prior_scales)[None])[0, problem.owner < len(terms)]
+        return np.asarray(problem.scale(np.asarray(prior_scales)[None])[0, problem.owner < len(terms)])
 
-    def explained(self, hypothesis, effects):
+    def explained(self, hypothesis: Hypothesis, effects: Collection[str]) -> float:
         """Rms per axis, over sigma, of what some effects of a hypothesis explain at its best, calibration taken out."""
         if hypothesis.effects.isdisjoint(effects):
             return 0.0
@@ -356,7 +390,7 @@ class ModelEvidence:
         return float(np.sqrt(max(mean @ problem.gram[0] @ mean, 0.0) / (3.0 * len(self.on_complete(hypothesis.terms)))))
 
     @_on_complete
-    def _mean(self, terms, prior_scales, level):
+    def _mean(self, terms: Sequence[EffectTerm], prior_scales: Sequence[float] | FloatArray, level: int) -> FloatArray:
         """Mean (k,) of the coefficients as `coefficients` gives it, without what their covariance costs."""
         broad = self._broadest(terms)
         if broad is None:
@@ -369,11 +403,13 @@ class ModelEvidence:
             problem = problem.on(*(part[None] for part in average.rest(index)))
             found = mean_over_cases(problem, np.delete(prior_scales, broad)[None])
         of_broad = average.mean(index, found if problem is None else problem.of_columns(found))
-        before = sum(len(self._prior(term).index) for term in terms[:broad])
+        before = sum(len(self._prior(term).columns) for term in terms[:broad])
         return np.concatenate([found[:before], of_broad, found[before:]])
 
     @_on_complete
-    def coefficients(self, terms, prior_scales, level):
+    def coefficients(
+        self, terms: Sequence[EffectTerm], prior_scales: FloatArray, level: int
+    ) -> tuple[FloatArray, FloatArray]:
         """Mean (k,) and covariance (k, k) of the coefficients of a set of terms at prior scales and a level (an index).
 
         The mean satisfies the constraint on positive coefficients; the covariance ignores it.
@@ -381,6 +417,6 @@ class ModelEvidence:
         return over_cases(self.projected(terms, [level]), np.asarray(prior_scales)[None])
 
 
-def averaged(value, terms):
+def averaged(value: FloatArray, terms: int) -> FloatArray:
     """Log evidence (levels,) over some terms' prior scales from (levels, m); a grid cut short counts as a whole one."""
-    return log_sum_exp(value) - terms * np.log(len(PRIOR_SCALES))
+    return np.asarray(log_sum_exp(value) - terms * np.log(len(PRIOR_SCALES)))

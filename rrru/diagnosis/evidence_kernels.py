@@ -11,6 +11,8 @@ import numba
 import numpy as np
 from scipy import special
 
+from rrru.diagnosis.aliases import BoolArray, FloatArray, IntArray
+
 # standard deviations above zero from which a condition is certain: its probability is 1 - 3e-5
 _CERTAIN_Z = 4.0
 # standard deviations from zero between which moments come from a table, and its entries per standard deviation
@@ -29,7 +31,7 @@ COLUMNS = 9
 
 
 @numba.njit(cache=True, error_model="numpy")
-def log_ndtr(x):
+def log_ndtr(x: float) -> float:
     """Logarithm of the standard normal distribution function."""
     if x > -30.0:
         return math.log(0.5 * math.erfc(-x / math.sqrt(2.0)))
@@ -37,7 +39,7 @@ def log_ndtr(x):
     return -0.5 * x * x - math.log(-x) - 0.5 * math.log(2.0 * math.pi) - 1.0 / x**2 + 2.5 / x**4
 
 
-def _tabulate():
+def _tabulate() -> FloatArray:
     """Logarithm (n,) of the normal distribution function and its derivative, the inverse Mills ratio (n,)."""
     z = np.linspace(_LOW_Z, _HIGH_Z, round((_HIGH_Z - _LOW_Z) * _PER_Z) + 1)
     log = special.log_ndtr(z)
@@ -48,7 +50,7 @@ _TABLE = _tabulate()
 
 
 @numba.njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc"})
-def _truncate(z):
+def _truncate(z: float) -> tuple[float, float, float]:
     """Log probability of y > 0 with y ~ N(z, 1), and mean and variance of y under that condition.
 
     By cubic interpolation between values and derivatives of a table, good to 1e-8.
@@ -72,7 +74,7 @@ def _truncate(z):
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _cumulants(z, mean, variance):
+def _cumulants(z: float, mean: float, variance: float) -> tuple[float, float]:
     """Skewness and excess kurtosis of y ~ N(z, 1) under y > 0, where its mean and variance are known."""
     if z < _LOW_Z:
         # those of the exponential distribution
@@ -84,7 +86,7 @@ def _cumulants(z, mean, variance):
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _find_least_probable(mean, covariance, order, count):
+def _find_least_probable(mean: FloatArray, covariance: FloatArray, order: IntArray, count: int) -> int:
     """Place in the order of the least probable coefficient without a factor, -1 where all these are certain."""
     best, lowest = -1, _CERTAIN_Z
     for place in range(count, len(order)):
@@ -96,9 +98,10 @@ def _find_least_probable(mean, covariance, order, count):
 
 
 @numba.njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc"})
-def _multiply(mean, covariance, i, precision, shift):
+def _multiply(mean: FloatArray, covariance: FloatArray, i: int, precision: float, shift: float) -> float:
     """Multiply a normal density by exp(-precision x_i^2 / 2 + shift x_i), in place; returns the variance's ratio."""
-    p, ratio = len(mean), 1.0 + precision * covariance[i, i]
+    p = len(mean)
+    ratio: float = 1.0 + precision * covariance[i, i]
     step, reduced, inverse = (shift - precision * mean[i]) / ratio, precision / ratio, 1.0 / ratio
     for r in range(p):
         mean[r] += covariance[i, r] * step
@@ -115,7 +118,9 @@ def _multiply(mean, covariance, i, precision, shift):
 
 
 @numba.njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc"})
-def match_factors(mean, covariance, order, state, tolerance, sweeps):
+def match_factors(
+    mean: FloatArray, covariance: FloatArray, order: IntArray, state: FloatArray, tolerance: float, sweeps: int
+) -> tuple[int, float]:
     """Find factors that match the moments, and multiply a normal density, mean (p,) and covariance (p, p), by them.
 
     order (p,), state (p, COLUMNS): overwritten by the coefficients' numbers, those with a factor first, and by what is
@@ -159,7 +164,7 @@ def match_factors(mean, covariance, order, state, tolerance, sweeps):
 
 
 @numba.njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc"})
-def log_orthant(mean, covariance, order, state):
+def log_orthant(mean: FloatArray, covariance: FloatArray, order: IntArray, state: FloatArray) -> tuple[float, float]:
     """Log probability that x ~ N(mean, covariance) is positive, and the correction that it contains.
 
     mean (p,), covariance (p, p), order (p,), state (p, COLUMNS): overwritten.
@@ -186,7 +191,16 @@ def log_orthant(mean, covariance, order, state):
 
 
 @numba.njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc"})
-def _factorize(gram, moment, scale, first, low, half, squares, logs):
+def _factorize(
+    gram: FloatArray,
+    moment: FloatArray,
+    scale: FloatArray,
+    first: int,
+    low: FloatArray,
+    half: FloatArray,
+    squares: FloatArray,
+    logs: FloatArray,
+) -> None:
     """Cholesky factor L of I + S gram S with S = diag(scale), and half = L^-1 S moment, from row first on.
 
     gram (k, k), moment, scale (k,); low (k, k): L, on its diagonal reciprocals; half (k,); squares (k + 1,): sums of
@@ -216,7 +230,15 @@ def _factorize(gram, moment, scale, first, low, half, squares, logs):
 
 
 @numba.njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc"})
-def _find_moments(low, half, index, first, inverse, mean, covariance):
+def _find_moments(
+    low: FloatArray,
+    half: FloatArray,
+    index: IntArray,
+    first: int,
+    inverse: FloatArray,
+    mean: FloatArray,
+    covariance: FloatArray,
+) -> None:
     """Mean (p,) and covariance (p, p) of the coefficients index (p,) under the posterior of untruncated ones.
 
     low, half: of `_factorize`; inverse (p, k): columns of L^-1, of which rows before the first are up to date.
@@ -243,7 +265,9 @@ def _find_moments(low, half, index, first, inverse, mean, covariance):
 
 
 @numba.njit(cache=True, error_model="numpy")
-def log_evidence_and_correction(gram, moment, scale, positive):
+def log_evidence_and_correction(
+    gram: FloatArray, moment: FloatArray, scale: FloatArray, positive: BoolArray
+) -> tuple[FloatArray, FloatArray]:
     """`log_evidence` (v, m), and the correction (v, m) of the probability of non-negative coefficients in it."""
     v, k = moment.shape
     m, index = scale.shape[0], np.flatnonzero(positive)
@@ -270,7 +294,15 @@ def log_evidence_and_correction(gram, moment, scale, positive):
 
 
 @numba.njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc"})
-def log_evidence_of_blocks(gram, moment, across, numbers, ends, scale, positive):
+def log_evidence_of_blocks(
+    gram: FloatArray,
+    moment: FloatArray,
+    across: FloatArray,
+    numbers: IntArray,
+    ends: IntArray,
+    scale: FloatArray,
+    positive: BoolArray,
+) -> FloatArray:
     """Log evidence (b, m) of each of several blocks of columns alone, at m prior deviations.
 
     gram (k, k) less across (k, x) times its transpose, and moment (k,): of all columns; numbers (n,): columns of the
@@ -294,7 +326,7 @@ def log_evidence_of_blocks(gram, moment, across, numbers, ends, scale, positive)
     return result
 
 
-def log_evidence(gram, moment, scale, positive):
+def log_evidence(gram: FloatArray, moment: FloatArray, scale: FloatArray, positive: BoolArray) -> FloatArray:
     """Logarithm of the evidence of k normal coefficients over that of zero coefficients.
 
     gram (v, k, k), moment (v, k): of the whitened columns, for v noise levels; scale (m, k): prior standard deviations;
@@ -307,17 +339,18 @@ def log_evidence(gram, moment, scale, positive):
     return log_evidence_and_correction(gram, moment, scale[distinct], positive)[0][:, which]
 
 
-def _distinct(rows):
+def _distinct(rows: FloatArray) -> tuple[IntArray, list[int]]:
     """Numbers (d,) of the first of each of the distinct rows (m, k), and which of these each row is (m,)."""
-    first = {}
+    first: dict[bytes, int] = {}
     which = [first.setdefault(row.tobytes(), len(first)) for row in rows]
     return np.unique(which, return_index=True)[1], which
 
 
-def log_sum_exp(value):
+def log_sum_exp(value: FloatArray) -> FloatArray:
     """Logarithm of the sums of exponentials along the last axis: scipy's, without what it costs on small arrays."""
     top = value.max(axis=-1, keepdims=True)
     largest = value == top
     count = largest.sum(axis=-1)
     others = np.exp(np.where(largest, -np.inf, value) - top).sum(axis=-1)
-    return np.log1p(others / count) + np.log(count) + top[..., 0]
+    result: FloatArray = np.log1p(others / count) + np.log(count) + top[..., 0]
+    return result

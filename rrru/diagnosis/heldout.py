@@ -1,5 +1,6 @@
 """Cross-validation: what a hypothesis predicts of points that it was not fitted on."""
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -8,12 +9,13 @@ import numpy as np
 from scipy.linalg import cho_solve, solve_triangular
 
 from rrru.campaign.noise import along_runs
+from rrru.diagnosis.aliases import FloatArray, IntArray
 from rrru.diagnosis.evidence import ModelEvidence
 from rrru.diagnosis.options import OPTIONS
-from rrru.diagnosis.problem import Case
-from rrru.diagnosis.terms import signatures
+from rrru.diagnosis.problem import DiagnosisProblem
+from rrru.diagnosis.terms import EffectTerm, signatures
 from rrru.diagnosis.whitened import discrepancy_scales, spectrum
-from rrru.estimation.cross_validation import choose_folds, complement_fits
+from rrru.estimation.cross_validation import ComplementFit, choose_folds, complement_fits
 from rrru.estimation.noise_model import half_waves, lengths
 
 
@@ -26,24 +28,24 @@ class Prediction:
     discrepancy, along the cosines of the series (n,) where these are given, else at each point.
     """
 
-    residual_mm: np.ndarray
-    spread: np.ndarray
-    left_mm2: np.ndarray
-    series: np.ndarray | None = None
+    residual_mm: FloatArray
+    spread: FloatArray
+    left_mm2: FloatArray
+    series: IntArray | None = None
 
     @property
-    def uncertainty_mm2(self):
+    def uncertainty_mm2(self) -> FloatArray:
         """Expected squared distance (n,) between prediction and truth if the hypothesis holds."""
-        return (self.spread**2).sum(axis=(1, 2))
+        return np.asarray((self.spread**2).sum(axis=(1, 2)))
 
     @property
-    def log_score(self):
+    def log_score(self) -> FloatArray:
         """Log predictive score (n,) under noise, discrepancy and the prediction's own uncertainty."""
         residual, spread = self.coordinates
         return _log_score(residual, self.left_mm2 + (spread**2).sum(axis=-1))
 
     @property
-    def coordinates(self):
+    def coordinates(self) -> tuple[FloatArray, FloatArray]:
         """Residuals (n, 3) and their spread (n, 3, k) as they are scored.
 
         With series they are those of the cosines, whose scores have the same sum over a series as those of the points:
@@ -55,39 +57,45 @@ class Prediction:
         return together[..., 0], together[..., 1:]
 
 
-def _log_score(residual, variance):
+def _log_score(residual: FloatArray, variance: FloatArray) -> FloatArray:
     """`Prediction.log_score` (n,) of residuals (n, 3) with their variance (n, 3)."""
-    return -0.5 * (residual**2 / variance + np.log(variance)).sum(axis=-1)
+    return np.asarray(-0.5 * (residual**2 / variance + np.log(variance)).sum(axis=-1))
 
 
 @dataclass(frozen=True)
 class HeldOut:
-    """Predictions of every used reading of a case from those of the other folds, on one linearisation."""
+    """Predictions of every used reading of a problem from those of the other folds, on one linearisation."""
 
-    case: Case
+    problem: DiagnosisProblem
     evidence: ModelEvidence
 
     @cached_property
-    def fold(self):
+    def fold(self) -> IntArray:
         """Fold numbers (m,) whose complements determine the calibration, see `rrru.estimation.cross_validation`.
 
         Runs where every trajectory was driven more than once. Else five interleaved stretches: leaving out the only
         run of a kind would require extrapolation, which says nothing about the effect. Where one fold alone determines
         a parameter, as of a target that was seen at a few stops, every fifth stop.
         """
-        white = self.evidence.linear.base / self.case.noise_mm
+        white = self.evidence.linear.base / self.problem.noise_mm
         return choose_folds(self._candidates(), white)
 
-    def _candidates(self):
+    def _candidates(self) -> Iterator[IntArray]:
         """Fold numbers (m,), the most demanding ones first."""
-        frame, run = self.case.points, self.case.run
+        frame, run = self.problem.points, self.problem.run
         if (frame.groupby("trajectory")["run"].nunique() > 1).all():
             yield np.unique(run, return_inverse=True)[1] % OPTIONS.max_run_folds
-        place = within(run, self.case.stop)
+        place = within(run, self.problem.stop)
         for length in (OPTIONS.points_per_stretch, 1):
             yield np.unique((place // length + run) % OPTIONS.stretch_folds, return_inverse=True)[1]
 
-    def predict(self, terms, prior_scales, level, uncertain=True):
+    def predict(
+        self,
+        terms: Sequence[EffectTerm],
+        prior_scales: Sequence[float] | FloatArray,
+        level: int,
+        uncertain: bool = True,
+    ) -> Prediction:
         """Prediction by the calibration together with a set of terms.
 
         The fit is that of `ModelEvidence.coefficients` at given prior scales and discrepancy level (an index), with the
@@ -101,9 +109,9 @@ class HeldOut:
             residual[out] = linear.data[out] - together[out] @ fit.mean
             if uncertain:
                 spread[out] = fit.half(together[out].reshape(-1, len(fit.mean))).T.reshape(-1, 3, len(fit.mean))
-        return Prediction(residual, spread, self._left(level), self.case.series if self._whole_runs else None)
+        return Prediction(residual, spread, self._left(level), self.problem.series if self._whole_runs else None)
 
-    def gains(self, terms, prior_scales, level):
+    def gains(self, terms: Sequence[EffectTerm], prior_scales: Sequence[float] | FloatArray, level: int) -> list[float]:
         """Log predictive score that each of the terms adds to that of the others, at these prior scales.
 
         Without the term its coefficients t are zero. The others then have the mean m - C_.t C_tt^-1 m_t and the
@@ -130,19 +138,21 @@ class HeldOut:
             result.append(float(score - _log_score(residual, variance).sum()))
         return result
 
-    def on_complete(self, terms):
+    def on_complete(self, terms: Sequence[EffectTerm]) -> "HeldOut":
         """The predictions of the readings at which all effects of terms have what they need."""
         evidence = self.evidence.on_complete(terms)
         if evidence is self.evidence:
             return self
-        return HeldOut(self.case.at_complete({term.effect for term in terms}), evidence)
+        return HeldOut(self.problem.at_complete({term.effect for term in terms}), evidence)
 
-    def _blocks(self, terms):
+    def _blocks(self, terms: Sequence[EffectTerm]) -> list[FloatArray]:
         """Columns (n, 3, k) of the calibration and of each term."""
         linear = self.evidence.linear
         return [linear.base, *signatures(self.evidence.library, linear, terms)]
 
-    def _fits(self, terms, prior_scales, level):
+    def _fits(
+        self, terms: Sequence[EffectTerm], prior_scales: Sequence[float] | FloatArray, level: int
+    ) -> dict[int, ComplementFit]:
         """ComplementFit of calibration and terms by the number of the fold that is left out."""
         linear, count = self.evidence.linear, self.evidence.linear.base.shape[-1]
         sd, mean = linear.base_prior or (np.full(count, np.inf), np.zeros(count))
@@ -151,28 +161,28 @@ class HeldOut:
         moment[:count] = np.where(np.isfinite(sd), mean, 0.0) * precision[:count]
         together = np.concatenate([*self._blocks(terms), linear.data[..., None]], axis=-1)
         if self._whole_runs:
-            together, _ = along_runs(together, self.case.series)
+            together, _ = along_runs(together, self.problem.series)
         white = together / np.sqrt(self._left(level))[..., None]
         return complement_fits(white, self.fold, precision, moment)
 
     @cached_property
-    def _whole_runs(self):
+    def _whole_runs(self) -> bool:
         """Whether every fold is of whole runs."""
-        run = self.case.series
+        run = self.problem.series
         return all(len(np.unique(self.fold[run == label])) == 1 for label in np.unique(run))
 
-    def _left(self, level):
+    def _left(self, level: int) -> FloatArray:
         """Variance (n, 3) of noise and discrepancy, along the runs' cosines where folds are whole runs."""
-        noise, series = self.evidence.noise, self.case.series
+        noise, series = self.evidence.noise, self.problem.series
         misfit = (noise.mean_mm * discrepancy_scales(noise)[level]) ** 2
         if not self._whole_runs:
             size = noise.axis_mm**2 * (1.0 + noise.offset) + misfit
             return np.broadcast_to(size, self.evidence.linear.data.shape)
         waves = half_waves(series)
-        return noise.variance(waves, lengths(series)) + misfit * spectrum(waves)[:, None]
+        return np.asarray(noise.variance(waves, lengths(series)) + misfit * spectrum(waves)[:, None])
 
 
-def within(run, at):
+def within(run: IntArray, at: IntArray) -> IntArray:
     """Number (m,) from 0 on of the stop in its run (m,); at (m,): at which stop of the campaign each row was read."""
     result = np.empty(len(run), dtype=int)
     for label in np.unique(run):
@@ -180,11 +190,11 @@ def within(run, at):
     return result
 
 
-def resampled_rows(case, generator, draws):
-    """Rows (draws, m) of a case resampled by runs, or by stretches of five points where there are few runs."""
-    block = run = case.run
+def resampled_rows(problem: DiagnosisProblem, generator: np.random.Generator, draws: int) -> IntArray:
+    """Rows (draws, m) of a problem resampled by runs, or by stretches of five points where there are few runs."""
+    block = run = problem.run
     if len(np.unique(run)) < OPTIONS.min_resampled_runs:
-        block = run * (len(run) + 1) + within(run, case.stop) // OPTIONS.points_per_stretch
+        block = run * (len(run) + 1) + within(run, problem.stop) // OPTIONS.points_per_stretch
     groups = [np.flatnonzero(block == label) for label in dict.fromkeys(block.tolist())]
     result = np.empty((draws, len(run)), dtype=int)
     for k in range(draws):

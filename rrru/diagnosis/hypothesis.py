@@ -1,9 +1,12 @@
 """A hypothesis: a set of terms, and its evidence."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TypeAlias
 
-import numpy as np
+from rrru.diagnosis.aliases import FloatArray
+from rrru.diagnosis.terms import EffectTerm
 
 
 @dataclass(frozen=True)
@@ -13,20 +16,24 @@ class Hypothesis:
     Levels at which it has not been computed have -inf.
     """
 
-    terms: tuple
-    evidence: np.ndarray
-    prior_scales: np.ndarray
+    terms: tuple[EffectTerm, ...]
+    evidence: FloatArray
+    prior_scales: FloatArray
 
     @cached_property
-    def effects(self):
+    def effects(self) -> frozenset[str]:
         """Names of the effects, as a set."""
         return frozenset(term.effect for term in self.terms)
 
     @cached_property
-    def level(self):
+    def level(self) -> int:
         """The level of the highest evidence, an index."""
         return int(self.evidence.argmax())
 
-    def strengths_of(self, terms, level):
+    def strengths_of(self, terms: Sequence[EffectTerm], level: int) -> list[float]:
         """Prior scales of some of its terms at a level (an index)."""
         return [float(self.prior_scales[level][self.terms.index(term)]) for term in terms]
+
+
+# a hypothesis and its discrepancy level (an index)
+Answer: TypeAlias = tuple[Hypothesis, int]

@@ -1,5 +1,6 @@
 """Which effects cause the gap: calibrate, search the best set, fit it on the exact model, search again from there."""
 
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -7,21 +8,24 @@ import numpy as np
 
 from rrru.campaign import noise
 from rrru.campaign.outliers import isolated
+from rrru.diagnosis.aliases import EffectKey, FloatArray
 from rrru.diagnosis.calibrate import calibrate, origin
 from rrru.diagnosis.detectability import with_seen
-from rrru.diagnosis.discrepancy_basis import UNKNOWN
+from rrru.diagnosis.discrepancy_basis import UNKNOWN, Library
 from rrru.diagnosis.drive_spectra import with_orders, with_spectra
 from rrru.diagnosis.evidence import ModelEvidence
 from rrru.diagnosis.heldout import HeldOut
-from rrru.diagnosis.hypothesis import Hypothesis
+from rrru.diagnosis.hypothesis import Answer, Hypothesis
 from rrru.diagnosis.model_fit import EffectModel, ModelFit, fit_model
 from rrru.diagnosis.model_space import ModelSpace
 from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.posterior import Posterior
-from rrru.diagnosis.problem import Case
-from rrru.diagnosis.state import State
-from rrru.diagnosis.terms import each_leg
+from rrru.diagnosis.problem import DiagnosisProblem
+from rrru.diagnosis.settings import Prior
+from rrru.diagnosis.state import LinearizedProblem, ModelState
+from rrru.diagnosis.terms import EffectTerm, each_leg, shape_probabilities
 from rrru.diagnosis.whitened import DISCREPANCY_SCALES, spectrum
+from rrru.effects.protocol import Coordinates
 from rrru.errors import FitError
 from rrru.estimation.noise_model import MIN_FREE_NUMBERS, alike, fit_noise, high_frequency_noise, p_value
 
@@ -33,15 +37,15 @@ KNOWN, STATED, UNKNOWN_NOISE = "known", "stated", "unknown"
 class InferenceResult:
     """What the search has found.
 
-    origin: State that calibrations start from; calibrated: of the calibration alone, under the noise that was found;
+    origin: where calibrations start; calibrated: of the calibration alone, under the noise that was found;
     fit: ModelFit of the hypothesis at its discrepancy level; evidence: on the last linearisation;
     posterior over all hypotheses; hypothesis, level: the best one and its discrepancy level; noise_from: "given",
     "repeats" or "fitted"; dropped: number of points left out as outliers.
     """
 
-    case: Case
-    origin: State
-    calibrated: State
+    problem: DiagnosisProblem
+    origin: ModelState
+    calibrated: ModelState
     fit: ModelFit
     evidence: ModelEvidence
     posterior: Posterior
@@ -51,71 +55,75 @@ class InferenceResult:
     dropped: int = 0
 
     @property
-    def state(self):
-        """The State of the fit."""
+    def state(self) -> ModelState:
+        """The ModelState of the fit."""
         return self.fit.state
 
     @cached_property
-    def held_out(self):
+    def held_out(self) -> HeldOut:
         """Predictions of left-out points."""
-        return HeldOut(self.case, self.evidence)
+        return HeldOut(self.problem, self.evidence)
 
-    def with_posterior(self, posterior):
+    def with_posterior(self, posterior: Posterior) -> "InferenceResult":
         """The inference with another posterior and its best hypothesis; the fit stays."""
         hypothesis, level = posterior.best()
         return replace(self, posterior=posterior, hypothesis=hypothesis, level=level)
 
 
-def with_arm(case, noise_mm=None, noise_rad=None):
-    """The case with orientations at the arm that gives them the positions' noise; what is not given is estimated.
+def with_arm(
+    problem: DiagnosisProblem, noise_mm: float | None = None, noise_rad: float | None = None
+) -> DiagnosisProblem:
+    """The problem with orientations at the arm that gives them the positions' noise; what is not given is estimated.
 
     What no effect of the library makes passes for noise in an estimate of poses in no order, in positions as in
     orientations. The arm is therefore the ratio of two estimates, or of two given numbers.
     """
     if not (noise_mm and noise_rad):
-        linear, columns = _few(case, calibrate(case))
-        both = (case.positions, ~case.positions)
-        found, turned = (high_frequency_noise(linear.data, columns, case.series, chosen) for chosen in both)
+        linear, columns = _few(problem, calibrate(problem))
+        both = (problem.positions, ~problem.positions)
+        found, turned = (high_frequency_noise(linear.data, columns, problem.series, chosen) for chosen in both)
         if noise_rad:
-            found = noise_mm or noise.quieter_repeats(case.measurements[case.used], found) or found
-        noise_mm, noise_rad = found, noise_rad or turned / case.arm_mm
-    return replace(case, arm_mm=noise_mm / noise_rad)
+            found = noise_mm or noise.quieter_repeats(problem.measurements[problem.used], found) or found
+        noise_mm, noise_rad = found, noise_rad or turned / problem.arm_mm
+    return replace(problem, arm_mm=noise_mm / noise_rad)
 
 
-def with_world_scale(case):
-    """The case with reflectors off the robot weighted by the ratio of the residuals of a fit of everything."""
-    if not case.on_world.any() or case.on_world.all():
-        return case
-    linear, columns = _few(case, calibrate(case))
+def with_world_scale(problem: DiagnosisProblem) -> DiagnosisProblem:
+    """The problem with reflectors off the robot weighted by the ratio of the residuals of a fit of everything."""
+    if not problem.on_world.any() or problem.on_world.all():
+        return problem
+    linear, columns = _few(problem, calibrate(problem))
     flat = columns.reshape(linear.data.size, -1)
     size = np.maximum(np.linalg.norm(flat, axis=0), 1e-300)
     fitted = flat / size @ np.linalg.lstsq(flat / size, linear.data.ravel(), rcond=1e-9)[0]
     squares = ((linear.data.ravel() - fitted).reshape(-1, 3) ** 2).sum(axis=1)
-    others = case.positions & ~case.on_world
-    scale = np.sqrt(squares[others].mean() / max(squares[case.on_world].mean(), 1e-12))
-    return replace(case, beside_scale=float(scale))
+    others = problem.positions & ~problem.on_world
+    scale = np.sqrt(squares[others].mean() / max(squares[problem.on_world].mean(), 1e-12))
+    return replace(problem, beside_scale=float(scale))
 
 
-def with_noise(case, linear, stated_mm):
-    """The case under the noise that a fit of all columns of a linearisation leaves, and the source of that noise.
+def with_noise(
+    problem: DiagnosisProblem, linear: LinearizedProblem, stated_mm: float | None
+) -> tuple[DiagnosisProblem, str]:
+    """The problem under the noise that a fit of all columns of a linearisation leaves, and the source of that noise.
 
     "fitted", see `rrru.estimation.noise_model`, or "repeats" where poses that were measured again say clearly less.
     """
-    repeats, complete = noise.repeat_noise(case.measurements[case.used]), case.complete(case.library)
+    repeats, complete = noise.repeat_noise(problem.measurements[problem.used]), problem.complete(problem.library)
     if 3 * complete.sum() < linear.base.shape[-1] + MIN_FREE_NUMBERS:
         complete[:] = True
-    columns = _noise_columns(case, linear, bool(stated_mm) or repeats[1] >= noise.ENOUGH_REPEATS)
+    columns = _noise_columns(problem, linear, bool(stated_mm) or repeats[1] >= noise.ENOUGH_REPEATS)
     # an effect is no noise where its inputs are unknown
-    data, columns, series = linear.data[complete], columns[complete], case.series[complete]
-    model = fit_noise(data, columns, series, stated_mm, repeats, spectrum if case.along_paths else None)
-    model = replace(model, alike=alike(data, columns, case.stop[complete], case.kind[complete]))
-    repeated = noise.quieter_repeats(case.measurements[case.used], model.mean_mm, model.correlation)
+    data, columns, series = linear.data[complete], columns[complete], problem.series[complete]
+    model = fit_noise(data, columns, series, stated_mm, repeats, spectrum if problem.along_paths else None)
+    model = replace(model, alike=alike(data, columns, problem.stop[complete], problem.kind[complete]))
+    repeated = noise.quieter_repeats(problem.measurements[problem.used], model.mean_mm, model.correlation)
     if repeated is not None:
-        return case.under(model.of_size(repeated)), "repeats"
-    return case.under(model), "fitted"
+        return problem.under(model.of_size(repeated)), "repeats"
+    return problem.under(model), "fitted"
 
 
-def _noise_columns(case, linear, known):
+def _noise_columns(problem: DiagnosisProblem, linear: LinearizedProblem, known: bool) -> FloatArray:
     """Columns (m, 3, k) that may explain the readings while the noise is estimated.
 
     All of the library. Where these leave too few numbers: without effects of many coefficients, then each effect in the
@@ -123,26 +131,30 @@ def _noise_columns(case, linear, known):
     that no number needs to be left. Where it is not and the library explains everything, the residuals of the
     calibration are used.
     """
-    blocks = {key: columns for key, columns in linear.columns.items() if key[0] in case.library}
-    searched = {key: blocks.pop(key) for key in [*blocks] if _is_searched(case.library[key[0]].coordinates, key[1])}
-    for chosen in _fewer_blocks(linear, blocks, case.library):
+    blocks = {key: columns for key, columns in linear.columns.items() if key[0] in problem.library}
+    searched = {key: blocks.pop(key) for key in [*blocks] if _is_searched(problem.library[key[0]].coordinates, key[1])}
+    for chosen in _fewer_blocks(linear, blocks, problem.library):
         columns = np.concatenate([linear.base, *chosen.values(), *linear.shape_columns.values()], axis=-1)
         if _leaves_enough(linear, columns):
-            return _with_significant(case, linear, columns, searched)
+            return _with_significant(problem, linear, columns, searched)
     return columns if known else linear.base
 
 
-def _leaves_enough(linear, columns):
+def _leaves_enough(linear: LinearizedProblem, columns: FloatArray) -> bool:
     """Whether columns (m, 3, k) leave enough of the numbers for an estimate of the noise."""
-    return linear.data.size - columns.shape[-1] >= max(MIN_FREE_NUMBERS, OPTIONS.min_free_share * linear.data.size)
+    return bool(
+        linear.data.size - columns.shape[-1] >= max(MIN_FREE_NUMBERS, OPTIONS.min_free_share * linear.data.size)
+    )
 
 
-def _is_searched(coordinates, shape):
+def _is_searched(coordinates: Coordinates, shape: int) -> bool:
     """Whether a shape of an effect was found in these data, see `rrru.diagnosis.drive_spectra`."""
     return coordinates.searched is not None and 0 < coordinates.stated <= shape
 
 
-def _with_significant(case, linear, columns, searched):
+def _with_significant(
+    problem: DiagnosisProblem, linear: LinearizedProblem, columns: FloatArray, searched: dict[EffectKey, FloatArray]
+) -> FloatArray:
     """Columns (m, 3, k), and those of each shape that was searched for that explain more than noise does.
 
     The best of many orders explains more of pure noise than its number of columns: with it the noise would be found
@@ -151,13 +163,15 @@ def _with_significant(case, linear, columns, searched):
     """
     for (name, shape), block in searched.items():
         together = np.concatenate([columns, block], axis=-1)
-        level = OPTIONS.max_searched_order_p * case.library[name].coordinates.weights[shape]
+        level = OPTIONS.max_searched_order_p * shape_probabilities(problem.library[name].coordinates)[shape]
         if _leaves_enough(linear, together) and p_value(linear.data, columns, block) < level:
             columns = together
     return columns
 
 
-def _fewer_blocks(linear, blocks, library):
+def _fewer_blocks(
+    linear: LinearizedProblem, blocks: dict[EffectKey, FloatArray], library: Library
+) -> Iterator[dict[EffectKey, FloatArray]]:
     """Blocks of columns by (effect, shape), in steps fewer of them."""
     yield blocks
     few = {key: columns for key, columns in blocks.items() if not library[key[0]].coordinates.broad}
@@ -167,56 +181,56 @@ def _fewer_blocks(linear, blocks, library):
     yield {key: columns for key, columns in fitting.items() if key[0] not in UNKNOWN}
 
 
-def _best_shapes(linear, blocks):
+def _best_shapes(linear: LinearizedProblem, blocks: dict[EffectKey, FloatArray]) -> dict[EffectKey, FloatArray]:
     """For each effect the block of columns with the smallest residuals together with the calibration."""
     basis, _ = np.linalg.qr(linear.base.reshape(linear.data.size, -1))
-    best = {}
+    best: dict[str, tuple[float, EffectKey]] = {}
     for key, columns in blocks.items():
         flat = columns.reshape(linear.data.size, -1)
         flat = flat - basis @ (basis.T @ flat)
         size = np.maximum(np.linalg.norm(flat, axis=0), 1e-300)
         coefficients = np.linalg.lstsq(flat / size, linear.data.ravel(), rcond=1e-9)[0]
         explained = float(((flat / size @ coefficients) ** 2).sum())
-        if explained > best.get(key[0], (-np.inf, None))[0]:
+        if explained > (best[key[0]][0] if key[0] in best else -np.inf):
             best[key[0]] = explained, key
     return {key: blocks[key] for _, key in best.values()}
 
 
-def _few(case, calibrated):
+def _few(problem: DiagnosisProblem, calibrated: ModelState) -> tuple[LinearizedProblem, FloatArray]:
     """The linearisation about a calibration, and the columns (m, 3, k) of all effects with few coefficients.
 
     Where these would leave less than a third of the numbers free, the calibration's columns alone.
     """
-    few = {name: effect for name, effect in case.library.items() if not effect.coordinates.broad}
-    linear = replace(case, library=few).linearise(calibrated)
+    few = {name: effect for name, effect in problem.library.items() if not effect.coordinates.broad}
+    linear = replace(problem, library=few).linearise(calibrated)
     columns = np.concatenate([linear.base, *linear.columns.values()], axis=-1)
-    return linear, (columns if columns.shape[-1] <= 2 * len(case) else linear.base)
+    return linear, (columns if columns.shape[-1] <= 2 * len(problem) else linear.base)
 
 
-def infer(case, prior, stated=KNOWN):
-    """InferenceResult of a case; stated: whether its noise is KNOWN, STATED within limits, or UNKNOWN_NOISE."""
-    total = case.count
+def infer(problem: DiagnosisProblem, prior: Prior, stated: str = KNOWN) -> InferenceResult:
+    """InferenceResult of a problem; stated: whether its noise is KNOWN, STATED within limits, or UNKNOWN_NOISE."""
+    total = problem.count
     for cleaning in range(OPTIONS.max_outlier_rounds + 1):
-        calibrated = calibrate(case)
+        calibrated = calibrate(problem)
         if stated == UNKNOWN_NOISE:
             # isolated outliers would be taken for noise
-            outliers = isolated(case.residual(calibrated), case.series, 0.0, case.kind)
+            outliers = isolated(problem.residual(calibrated), problem.series, 0.0, problem.kind)
             # a reading that was approached from the other side than its neighbours is no outlier
-            outliers &= case.complete(case.library)
+            outliers &= problem.complete(problem.library)
             if outliers.any():
-                case = case.without(outliers)
-                calibrated = calibrate(case)
-        case = case.standing(calibrated)
-        inference = _rounds(case, calibrated, prior, stated)
-        found = inference.case
+                problem = problem.without(outliers)
+                calibrated = calibrate(problem)
+        problem = problem.standing(calibrated)
+        inference = _rounds(problem, calibrated, prior, stated)
+        found = inference.problem
         outliers = isolated(found.residual(inference.state), found.series, found.noise_mm, found.kind)
         if cleaning == OPTIONS.max_outlier_rounds or not outliers.any():
             break
-        case = case.without(outliers)
-    return replace(inference, dropped=total - case.count)
+        problem = problem.without(outliers)
+    return replace(inference, dropped=total - problem.count)
 
 
-def with_effects(inference, effects):
+def with_effects(inference: InferenceResult, effects: Collection[str]) -> InferenceResult:
     """The inference with hypothesis and fit of exactly the named effects; the posterior stays."""
     same = inference.hypothesis.effects == frozenset(effects)
     known = (inference.hypothesis, inference.level) if same else inference.posterior.best_of(frozenset(effects))
@@ -229,12 +243,18 @@ def with_effects(inference, effects):
         known = Hypothesis(terms, found, prior_scales), int(found.argmax())
     hypothesis, level = known
     starts = (inference.fit.state, inference.origin) if hypothesis.terms else (inference.calibrated,)
-    fit = fit_hypothesis(inference.case, inference.evidence, starts, (hypothesis, level), inference.fit)
-    case = inference.case.with_approach(fit.state)
-    return replace(inference, case=case, hypothesis=hypothesis, level=level, fit=fit)
+    fit = fit_hypothesis(inference.problem, inference.evidence, starts, (hypothesis, level), inference.fit)
+    problem = inference.problem.with_approach(fit.state)
+    return replace(inference, problem=problem, hypothesis=hypothesis, level=level, fit=fit)
 
 
-def fit_hypothesis(case, evidence, starts, chosen, known=None):
+def fit_hypothesis(
+    problem: DiagnosisProblem,
+    evidence: ModelEvidence,
+    starts: Iterable[ModelState],
+    chosen: Answer,
+    known: ModelFit | None = None,
+) -> ModelFit:
     """ModelFit of a hypothesis at a level (an index), under the priors that the evidence has chosen for it.
 
     It is fitted to the readings at which all its effects have what they need. Where one value for all legs is probable
@@ -242,63 +262,66 @@ def fit_hypothesis(case, evidence, starts, chosen, known=None):
     ModelFit that may be the one asked for.
     """
     hypothesis, level = chosen
-    case, terms = case.at_complete(hypothesis.effects), tuple(map(each_leg, hypothesis.terms))
+    problem, terms = problem.at_complete(hypothesis.effects), tuple(map(each_leg, hypothesis.terms))
     scales = evidence.scales(terms, hypothesis.prior_scales[level])
-    if known and known.level == level and known.model.same_as(EffectModel(case, terms, scales)):
+    if known and known.level == level and known.model.same_as(EffectModel(problem, terms, scales)):
         return known
-    return fit_model(case, starts, terms, scales, level)
+    return fit_model(problem, starts, terms, scales, level)
 
 
 class _Linearization:
-    """Case, columns and noise at a state, with the harmonics and spectra that the residuals show there."""
+    """Problem, columns and noise at a state, with the harmonics and spectra that the residuals show there."""
 
-    def __init__(self, stated, stated_mm):
+    def __init__(self, stated: str, stated_mm: float) -> None:
         self._stated, self._stated_mm = stated, stated_mm
-        self._source = None
+        self._source: str | None = None
 
-    def at(self, case, state, terms=()):
-        """Case with harmonics and noise, its linearisation at a state with a hypothesis' terms, the noise's source."""
-        linear = case.linearise(state)
-        case, orders = with_orders(case, linear, terms)
-        case, waves = with_spectra(case, linear, terms)
-        columns_of = {key: columns for key, columns in linear.columns.items() if key[0] in case.library}
+    def at(
+        self, problem: DiagnosisProblem, state: ModelState, terms: Sequence[EffectTerm] = ()
+    ) -> tuple[DiagnosisProblem, LinearizedProblem, str]:
+        """Problem with harmonics and noise, its linearisation at a state with hypothesis terms, source of the noise."""
+        linear = problem.linearise(state)
+        problem, orders = with_orders(problem, linear, terms)
+        problem, waves = with_spectra(problem, linear, terms)
+        columns_of = {key: columns for key, columns in linear.columns.items() if key[0] in problem.library}
         linear = replace(linear, columns=columns_of)
         if orders or waves:
-            linear = replace(linear, columns=columns_of | case.linearise(state, [*orders, *waves]).columns)
+            linear = replace(linear, columns=columns_of | problem.linearise(state, [*orders, *waves]).columns)
         if self._stated == KNOWN:
-            return case, linear, "given"
+            return problem, linear, "given"
         # many columns take long to be projected out, and leave the same residuals at every state
-        if self._source and any(effect.coordinates.broad for effect in case.library.values()):
-            return case, linear, self._source
-        with_found, self._source = with_noise(case, linear, self._stated_mm if self._stated == STATED else None)
-        return with_found, linear, self._source
+        if self._source and any(effect.coordinates.broad for effect in problem.library.values()):
+            return problem, linear, self._source
+        with_found, source = with_noise(problem, linear, self._stated_mm if self._stated == STATED else None)
+        self._source = source
+        return with_found, linear, source
 
 
-def _is_nonlinear(case, linear, state, fitted):
+def _is_nonlinear(problem: DiagnosisProblem, linear: LinearizedProblem, state: ModelState, fitted: ModelState) -> bool:
     """Whether the exact model at a fitted state without shapes differs from the linearisation about a state."""
     predicted = linear.data - linear.base @ (fitted.deviations - state.deviations)
     predicted = predicted - sum(linear.columns[key] @ numbers for key, numbers in fitted.effects.items())
-    difference = np.sqrt(((case.residual(fitted) - predicted) ** 2).mean())
-    return difference > OPTIONS.max_nonlinearity_per_noise * case.noise_mm
+    difference = np.sqrt(((problem.residual(fitted) - predicted) ** 2).mean())
+    return bool(difference > OPTIONS.max_nonlinearity_per_noise * problem.noise_mm)
 
 
-def _rounds(case, calibrated, prior, stated):
+def _rounds(problem: DiagnosisProblem, calibrated: ModelState, prior: Prior, stated: str) -> InferenceResult:
     """Search and fit in turn until a hypothesis is the best one again."""
-    linearization, seen, start = _Linearization(stated, case.noise_mm), set(), origin(case)
-    case, linear, source = linearization.at(case, calibrated)
-    case, linear = with_seen(case, linear)
-    fit = fit_model(case, [calibrated])
+    linearization, seen, start = _Linearization(stated, problem.noise_mm), set(), origin(problem)
+    problem, linear, source = linearization.at(problem, calibrated)
+    problem, linear = with_seen(problem, linear)
+    fit = fit_model(problem, [calibrated])
     calibrated = state = fit.state
-    evidence = case.evidence(linear)
-    small = np.sqrt((linear.data**2).mean()) < OPTIONS.max_small_gap_per_noise * case.noise_mm
-    hypothesis = None
+    evidence = problem.evidence(linear)
+    small = np.sqrt((linear.data**2).mean()) < OPTIONS.max_small_gap_per_noise * problem.noise_mm
+    terms: tuple[EffectTerm, ...] = ()
     for _ in range(OPTIONS.max_search_rounds):
         space = ModelSpace(evidence.on_library(), prior)
-        first, confirmed = space.search(hypothesis.terms if hypothesis else ()), False
+        first, confirmed = space.search(terms), False
         posterior = space.posterior([first])
         while True:
             hypothesis, level = posterior.best()
-            shaped = any(len(case.library[term.effect].coordinates.shapes) > 1 for term in hypothesis.terms)
+            shaped = any(len(problem.library[term.effect].coordinates.shapes) > 1 for term in hypothesis.terms)
             discrepant = not hypothesis.effects.isdisjoint(UNKNOWN)
             # where a discrepancy function wins, a second linearisation at its fit is needed only if the model is
             # nonlinear on the way there, or the shape of an effect is still to be fitted
@@ -312,28 +335,29 @@ def _rounds(case, calibrated, prior, stated):
                 break
             # an answer is accepted once a search from the other end has found nothing better
             posterior, confirmed = space.confirmed(first), True
+        terms = hypothesis.terms
         if ended:
             break
         seen.add(frozenset(hypothesis.terms))
         # values that a dropped effect has left in the others can trap a fit
         dropped = {name for name, _ in state.effects} - tried.effects
-        found = fit_hypothesis(case, evidence, (calibrated if dropped else state, start), (tried, its_level))
-        if settled and not _is_nonlinear(case, linear, calibrated, found.state):
+        found = fit_hypothesis(problem, evidence, (calibrated if dropped else state, start), (tried, its_level))
+        if settled and not _is_nonlinear(problem, linear, calibrated, found.state):
             break
         try:
-            moved = case.standing(found.state).with_approach(found.state)
+            moved = problem.standing(found.state).with_approach(found.state)
             linearized = linearization.at(moved, found.state, tried.terms)
         except FitError:
             # the fitted model has no pose at a reading: the last linearisation is used
             break
-        fit, state, (case, linear, source) = found, found.state, linearized
-        evidence = case.evidence(linear)
+        fit, state, (problem, linear, source) = found, found.state, linearized
+        evidence = problem.evidence(linear)
     else:
         space = ModelSpace(evidence.on_library(), prior)
-        first, confirmed = space.search(hypothesis.terms), False
+        first, confirmed = space.search(terms), False
     if not confirmed:
         posterior = space.confirmed(first)
     hypothesis, level = posterior.best()
-    result = InferenceResult(case, start, calibrated, fit, evidence, posterior, hypothesis, level, source)
+    result = InferenceResult(problem, start, calibrated, fit, evidence, posterior, hypothesis, level, source)
     # estimate and hypothesis are of one set, whether the rounds have converged or cycle
     return with_effects(result, hypothesis.effects)

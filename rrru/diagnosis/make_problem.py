@@ -1,12 +1,14 @@
-"""Make the case of a campaign: its motion, the used points, the effects that they can test and at which of them.
+"""Make the problem of a campaign: its motion, the used points, the effects that they can test and at which of them.
 
 Lengths in mm, angles in rad.
 """
 
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
 
 import numpy as np
+import pandas as pd
 
 from rrru.campaign import measurements as rows
 from rrru.campaign.driven_path import (
@@ -19,17 +21,19 @@ from rrru.campaign.driven_path import (
     stops,
 )
 from rrru.campaign.stated_motion import stated_motion
+from rrru.diagnosis.aliases import BoolArray, FloatArray, IntArray
 from rrru.diagnosis.approach_direction import at_reversals, paths_between_stops, rest_widths, undetermined_senses
-from rrru.diagnosis.discrepancy_basis import unknown_functions
+from rrru.diagnosis.discrepancy_basis import TestedEffect, unknown_functions
 from rrru.diagnosis.drive_spectra import resolved
 from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.payload_nuisance import nuisance_priors
-from rrru.diagnosis.problem import Case
+from rrru.diagnosis.problem import DiagnosisProblem
 from rrru.effects.motion import Course, make_motion
-from rrru.effects.protocol import LOADS, PATH, complete_rows, known_values
+from rrru.effects.protocol import LOADS, PATH, Effect, Motion, complete_rows, known_values
 from rrru.errors import FitError
 from rrru.estimation.starts import register_measurements
-from rrru.kinematics.dynamics import carried_kg
+from rrru.kinematics.dynamics import Masses, carried_kg
+from rrru.kinematics.robot import Robot
 
 # why an effect that bears load is not tested where nothing loads it
 UNLOADED = "needs a load of the parts that deflect, and neither a stated mass nor payload_kg gives one"
@@ -37,12 +41,20 @@ UNLOADED = "needs a load of the parts that deflect, and neither a stated mass no
 _USABLE = "allowed: measured points within reach that are no outliers"
 
 
-def make_case(measurements, mechanism, masses, noise_mm, library, use_near_singularity=True, arm_mm=np.nan):
-    """The case of a measurement table.
+def make_diagnosis_problem(
+    measurements: pd.DataFrame,
+    mechanism: Robot,
+    masses: Masses,
+    noise_mm: float,
+    library: Mapping[str, Effect],
+    use_near_singularity: bool = True,
+    arm_mm: float = np.nan,
+) -> DiagnosisProblem:
+    """The DiagnosisProblem of a measurement table.
 
     Every point is used that was measured, is no outlier and can be reached. Effects whose needs the motion meets
-    nowhere are set aside with the reason; `Case.known` has the points at which the others have all that they need.
-    Raises FitError for an empty table.
+    nowhere are set aside with the reason; `DiagnosisProblem.known` has the points at which the others have all that
+    they need. Raises FitError for an empty table.
     """
     if not len(measurements):
         raise FitError("the campaign has no points; allowed: at least one row: check the file of measurements")
@@ -61,25 +73,39 @@ def make_case(measurements, mechanism, masses, noise_mm, library, use_near_singu
             testable[name] = function
     rows_of = {name: complete_rows(effect, motion) for name, effect in testable.items()}
     known = {name: rows for name, rows in rows_of.items() if not rows[used].all()}
-    sizes = float(noise_mm), float(arm_mm)
     nuisance_sd, bounds = nuisance_priors(motion, masses)
-    more = {"motion_at": motion_at, "known": known, "nuisance_sd": nuisance_sd, "bounds": bounds}
-    more["massless"] = _lacks_masses(mechanism, masses)
-    return Case(mechanism, measurements, motion, used, testable, untestable, *sizes, **more)
+    return DiagnosisProblem(
+        mechanism,
+        measurements,
+        motion,
+        used,
+        testable,
+        untestable,
+        float(noise_mm),
+        float(arm_mm),
+        motion_at=motion_at,
+        nuisance_sd=nuisance_sd,
+        bounds=bounds,
+        known=known,
+        massless=_lacks_masses(mechanism, masses),
+    )
 
 
-def _lacks_masses(mechanism, masses):
+def _lacks_masses(mechanism: Robot, masses: Masses) -> bool:
     """Whether no mass of a robot is stated whose links have masses of their own."""
     own = getattr(mechanism, "point_masses", None)
     return own is not None and not own and not carried_kg(mechanism, masses, np.zeros(1)).any()
 
 
-def _tested(library, motion, used, count):
+def _tested(
+    library: Mapping[str, Effect], motion: Motion, used: BoolArray, count: int
+) -> tuple[dict[str, TestedEffect], dict[str, str]]:
     """Effects that the used points can test, and others with the reason.
 
     count: how many numbers the used points give about the robot.
     """
-    testable, untestable = {}, {}
+    testable: dict[str, TestedEffect] = {}
+    untestable: dict[str, str] = {}
     for name, effect in library.items():
         if _fitted(effect, motion):
             untestable[name] = "the calibration's own parameters absorb it"
@@ -92,7 +118,7 @@ def _tested(library, motion, used, count):
     return testable, untestable
 
 
-def _lacking(effect, motion, used):
+def _lacking(effect: TestedEffect, motion: Motion, used: BoolArray) -> str:
     """Why the used points do not determine what an effect needs, empty where they do."""
     values = {need: getattr(motion, need)[used] for need in effect.needs if need != PATH}
     known = {need: value[known_values(value)].reshape(-1, value[0].size) for need, value in values.items()}
@@ -109,12 +135,12 @@ def _lacking(effect, motion, used):
     return "" if complete_rows(effect, motion)[used].any() else no_approach(used)
 
 
-def no_approach(used):
+def no_approach(used: BoolArray) -> str:
     """Why an effect that depends on the sense in which the drives arrive is not tested at used points (n,)."""
     return f"the sense in which the drives arrive is known at none of {int(used.sum())} points"
 
 
-def _count_numbers(measurements, used, stop):
+def _count_numbers(measurements: pd.DataFrame, used: BoolArray, stop: IntArray) -> int:
     """How many numbers the used points give about the robot: at each stop at most the six of the platform's pose."""
     turned = np.zeros(len(used), dtype=bool)
     if rows.has_turns(measurements):
@@ -124,7 +150,7 @@ def _count_numbers(measurements, used, stop):
     return int(np.minimum(np.bincount(stop, on_robot * (3.0 + 3.0 * turned)), 6.0).sum())
 
 
-def _fitted(effect, motion):
+def _fitted(effect: Effect, motion: Motion) -> bool:
     """Whether an effect changes only constants from which the calibration chooses its parameters."""
     coordinates = effect.coordinates
     values = coordinates.to_values(np.array(coordinates.typical), coordinates.shapes[0])
@@ -132,7 +158,7 @@ def _fitted(effect, motion):
     return twists.ndim == 3 and len(twists) == 1 and not (twists[0].astype(bool) & ~motion.robot.offered).any()
 
 
-def _unknown_approach(measurements, mechanism, course):
+def _unknown_approach(measurements: pd.DataFrame, mechanism: Robot, course: Course) -> BoolArray:
     """Where (n, K) the rows do not determine from which side a drive comes: starts of runs, and next to reversals."""
     run, stop = measurements["run"].to_numpy(), stops(measurements)
     # no column says how the robot got to a run's start
@@ -146,7 +172,7 @@ def _unknown_approach(measurements, mechanism, course):
     return result | at_reversals(course, other, rest_widths(course.drive[first], run[first], mechanism.parts.units))
 
 
-def _course(measurements, mechanism, actuators):
+def _course(measurements: pd.DataFrame, mechanism: Robot, actuators: FloatArray) -> tuple[Course, BoolArray]:
     """The commanded Course, and where (n, K) it is not determined from which side a drive comes.
 
     At the measured points it has the table's own actuator values.
@@ -156,25 +182,32 @@ def _course(measurements, mechanism, actuators):
         motion["drive_motion"] = drive_rates(measurements, actuators)
     stated = stated_motion(measurements)
     if stated is not None and stated.stops:
-        return _stopping(measurements, mechanism, Course(drive=actuators, path_drive=actuators, stops=True, **motion))
+        course = Course(drive=actuators, path_drive=actuators, stops=True, **motion)
+        return _stopping(measurements, mechanism, course, stated.between)
     at_rest = not passes_points(measurements)
     path_drive = _path_drive(measurements, path, (mechanism, actuators, motion["path_index"]))
     course = Course(drive=actuators, path_drive=path_drive, stops=at_rest, **motion)
     return course, _unknown_approach(measurements, mechanism, course)
 
 
-def _stopping(measurements, mechanism, course):
-    """`_course` of a campaign that states that the robot rests at each reading: all rows of a stop have its senses."""
+def _stopping(
+    measurements: pd.DataFrame, mechanism: Robot, course: Course, between: str | None
+) -> tuple[Course, BoolArray]:
+    """`_course` of a campaign that states that the robot rests at each reading: all rows of a stop have its senses.
+
+    between: of its `rrru.campaign.stated_motion.StatedMotion`.
+    """
     stop, run = stops(measurements), measurements["run"].to_numpy()
     first = np.diff(stop, prepend=-1) > 0
     drive, run = course.drive[first], run[first]
-    between = stated_motion(measurements).between
     paths, index = paths_between_stops(mechanism, drive, course.position_mm[first], between)
     unknown = undetermined_senses(paths, index, run, rest_widths(drive, run, mechanism.parts.units))
     return replace(course, path_drive=paths[0], path_index=index[stop]), unknown[stop]
 
 
-def _path_drive(measurements, path, drives, degree=DEGREE):
+def _path_drive(
+    measurements: pd.DataFrame, path: FloatArray, drives: tuple[Robot, FloatArray, IntArray], degree: int = DEGREE
+) -> FloatArray:
     """Actuator values (N, K) along a path (N, 3) by splines of an odd degree through the points of each run.
 
     Straight between stops in no order.
@@ -194,4 +227,4 @@ def _path_drive(measurements, path, drives, degree=DEGREE):
         good = np.flatnonzero(~lost)
         result = result[good[np.maximum(np.searchsorted(good, np.arange(len(lost)), side="right") - 1, 0)]]
     result[index] = actuators
-    return result
+    return np.asarray(result)

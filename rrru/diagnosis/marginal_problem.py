@@ -9,33 +9,36 @@ is a problem in the other columns (x) alone:
 to whose log evidence the term adds 1/2 g_z A^-1 g_z - 1/2 log |I + diag(s) G_zz diag(s)|.
 """
 
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
+import numpy.typing as npt
 from scipy.linalg import cho_solve, solve_triangular
 from scipy.linalg.lapack import dposv
 from scipy.optimize import nnls
 
 from rrru.diagnosis import evidence_kernels as kernels
+from rrru.diagnosis.aliases import BoolArray, FloatArray, Grams, IntArray
 
 
 class Prior(NamedTuple):
     """Prior of k coefficients: columns' numbers, sizes at prior scale 1, largest sizes, and which are positive."""
 
-    index: np.ndarray
-    size: np.ndarray
-    largest: np.ndarray
-    positive: np.ndarray
+    columns: IntArray
+    size: FloatArray
+    largest: FloatArray
+    positive: BoolArray
 
     @classmethod
-    def normal(cls, index):
+    def normal(cls, index: IntArray) -> Self:
         """Prior of columns of unit deviation, which no prior scale changes."""
         nothing = np.zeros(len(index))
         return cls(index, nothing + 1.0, nothing + np.inf, nothing > 0.0)
 
-    def at(self, prior_scale):
+    def at(self, prior_scale: float) -> FloatArray:
         """Sizes at a prior scale."""
         return np.minimum(prior_scale * self.size, self.largest)
 
@@ -52,29 +55,31 @@ class MarginalProblem:
     mass; and at_least (terms,): prior scales under which the terms are as large as found.
     """
 
-    gram: np.ndarray
-    moment: np.ndarray
-    size: np.ndarray
-    largest: np.ndarray
-    positive: np.ndarray
-    about: np.ndarray
-    owner: np.ndarray
-    index: np.ndarray
-    mix: np.ndarray | None = None
+    gram: FloatArray
+    moment: FloatArray
+    size: FloatArray
+    largest: FloatArray
+    positive: BoolArray
+    about: FloatArray
+    owner: IntArray
+    index: IntArray
+    mix: FloatArray | None = None
     weights: tuple[bool, ...] = ()
-    at_least: np.ndarray | None = None
+    at_least: FloatArray = field(default_factory=lambda: np.zeros(0))
 
     @classmethod
-    def of(cls, priors, count, grams):
+    def of(cls, priors: Sequence[Prior], count: int, grams: Grams) -> Self:
         """The problem with the Priors of so many terms, and after them of their shapes.
 
         grams: from numbers (k,) of columns to their Gram matrices (levels, k, k) and moments (levels, k).
         """
-        owner = np.repeat(np.minimum(np.arange(len(priors)), count), [len(prior.index) for prior in priors])
-        index, *rest = (np.concatenate(parts) for parts in zip(*priors, strict=True))
-        return cls(*grams(index), *rest, np.zeros(len(index)), owner, index)
+        owner = np.repeat(np.minimum(np.arange(len(priors)), count), [len(prior.columns) for prior in priors])
+        index, size, largest, positive = (np.concatenate(parts) for parts in zip(*priors, strict=True))
+        gram, moment = grams(index)
+        about, at_least = np.zeros(len(index)), np.zeros(count)
+        return cls(gram, moment, size, largest, positive, about, owner, index, at_least=at_least)
 
-    def on(self, grams, moments):
+    def on(self, grams: FloatArray, moments: FloatArray) -> Self:
         """The problem on other Gram matrices (levels, r, r) and moments (levels, r) of its columns."""
         if self.mix is None:
             return replace(self, gram=grams, moment=moments)
@@ -86,37 +91,38 @@ class MarginalProblem:
         gram[:, f:, f:] = self.mix.T @ grams[:, f:, f:] @ self.mix
         return replace(self, gram=gram, moment=np.concatenate([moments[:, :f], moments[:, f:] @ self.mix], axis=1))
 
-    def of_columns(self, coefficients):
+    def of_columns(self, coefficients: FloatArray) -> FloatArray:
         """Coefficients (r,) of the columns from those of the problem (k,)."""
         if self.mix is None:
             return coefficients
         f = len(self.index) - len(self.mix)
         return np.concatenate([coefficients[:f], self.mix @ coefficients[f:]])
 
-    def of_coefficients(self, rows):
+    def of_coefficients(self, rows: FloatArray) -> FloatArray:
         """Rows (k, n) of the coefficients' columns from those of the columns (r, n)."""
         if self.mix is None:
             return rows
         f = len(self.index) - len(self.mix)
         return np.concatenate([rows[:f], self.mix.T @ rows[f:]])
 
-    def reordered(self, terms, coefficients):
+    def reordered(self, terms: Sequence[int], coefficients: IntArray) -> Self:
         """The problem with terms (terms,), and coefficients (k,) of these and of shapes, in an order of old numbers."""
         k = np.concatenate([coefficients, np.arange(len(coefficients), len(self.size))])
         rank = np.append(np.argsort(terms), len(terms))
         arrays = {name: getattr(self, name)[k] for name in ("size", "largest", "positive", "about")}
         index = np.concatenate([self.index[coefficients], self.index[len(coefficients) :]])
-        at_least = None if self.at_least is None else self.at_least[terms]
         gram, moment, owner = self.gram[:, k[:, None], k], self.moment[:, k], rank[self.owner[k]]
-        return replace(self, gram=gram, moment=moment, owner=owner, at_least=at_least, index=index, **arrays)
+        return replace(
+            self, gram=gram, moment=moment, owner=owner, at_least=self.at_least[terms], index=index, **arrays
+        )
 
-    def scale(self, prior_scales):
+    def scale(self, prior_scales: FloatArray) -> FloatArray:
         """Prior standard deviations (m, k) at prior_scales (m, terms)."""
         scales = np.concatenate([prior_scales, np.ones((len(prior_scales), 1))], axis=1)
         return np.minimum(scales[:, self.owner] * self.size, self.largest)
 
 
-def gained(problem, scale):
+def gained(problem: MarginalProblem, scale: FloatArray) -> FloatArray:
     """Log evidence (levels, m) of a MarginalProblem at prior deviations (m, k) over that of none of its terms."""
     scale = np.ascontiguousarray(scale)
     gram, moment = np.ascontiguousarray(problem.gram), np.ascontiguousarray(problem.moment)
@@ -127,7 +133,7 @@ def gained(problem, scale):
     return at_means[:, None] + kernels.log_evidence(gram, moment - explained, scale, problem.positive)
 
 
-def evidence_error(problem, scale):
+def evidence_error(problem: MarginalProblem, scale: FloatArray) -> FloatArray:
     """How far (levels, m) `gained` may be off at prior deviations (m, k): the size of the correction in it.
 
     It comes from the probability of the coefficients that cannot be negative, see `tests.diagnosis.orthant`.
@@ -137,7 +143,7 @@ def evidence_error(problem, scale):
     return np.abs(correction)
 
 
-def posterior_mean(problem, scale):
+def posterior_mean(problem: MarginalProblem, scale: FloatArray) -> FloatArray:
     """The mean (k,) of a MarginalProblem of one level at prior deviations (k,).
 
     Where that has negative positive coefficients their most probable point.
@@ -151,27 +157,27 @@ def posterior_mean(problem, scale):
     return about + scale * mean
 
 
-def posterior_covariance(problem, scale):
+def posterior_covariance(problem: MarginalProblem, scale: FloatArray) -> FloatArray:
     """The covariance (k, k) of a MarginalProblem of one level at prior deviations (k,)."""
     return scale[:, None] * np.linalg.inv(_precision(problem.gram[0], scale)) * scale
 
 
-def _precision(gram, scale):
+def _precision(gram: FloatArray, scale: FloatArray) -> FloatArray:
     """Precision (k, k) of the coefficients over their prior deviations (k,)."""
     return scale[:, None] * gram * scale + np.eye(len(scale))
 
 
-def _solved(precision, moment):
+def _solved(precision: FloatArray, moment: FloatArray) -> FloatArray:
     """Solution (k,) or (k, n) of a symmetric positive definite system; half the work of a general one."""
     if not len(precision):
         return moment
     _, solution, info = dposv(precision.T, moment, lower=True)
     if info:
         raise np.linalg.LinAlgError(f"precision of the coefficients is not positive definite (row {info})")
-    return solution
+    return np.asarray(solution)
 
 
-def _not_negative(precision, moment, positive):
+def _not_negative(precision: FloatArray, moment: FloatArray, positive: BoolArray) -> FloatArray:
     """The most probable point (k,) without negative positive coefficients, the others found from these."""
     free = ~positive
     both = np.column_stack([precision[free][:, positive], moment[free]])
@@ -191,7 +197,9 @@ class Average:
     numbers of further columns to leave out, which no other term of a set has. evidence: log evidence of the term alone.
     """
 
-    def __init__(self, gram, moment, index, size, apart=()):
+    def __init__(
+        self, gram: FloatArray, moment: FloatArray, index: IntArray, size: FloatArray, apart: npt.ArrayLike = ()
+    ) -> None:
         self._gram, self._moment, self._index, self._size = gram, moment, index, size
         self._apart = np.asarray(apart, dtype=int)
         self._factor = _factor(gram, index, size)
@@ -199,35 +207,35 @@ class Average:
         self.evidence = float(0.5 * self._half @ self._half - np.log(np.diag(self._factor)).sum())
 
     @cached_property
-    def others(self):
+    def others(self) -> BoolArray:
         """Which columns (K,) other terms of a set may have."""
         result = np.full(len(self._moment), True)
         result[self._index] = result[self._apart] = False
         return result
 
     @cached_property
-    def across(self):
+    def across(self) -> FloatArray:
         """Factor (K, z) of what is averaged out of the other columns' Gram matrix: its product with its transpose."""
         columns = self._size[:, None] * self._gram[self._index]
         half = solve_triangular(self._factor, columns, lower=True, check_finite=False)
         return np.where(self.others[:, None], half.T, 0.0)
 
     @cached_property
-    def moment(self):
+    def moment(self) -> FloatArray:
         """Moments (K,) of the other columns after the average."""
-        return self._moment - self.across @ self._half
+        return np.asarray(self._moment - self.across @ self._half)
 
-    def rest(self, index):
+    def rest(self, index: IntArray) -> tuple[FloatArray, FloatArray]:
         """Gram matrix (k, k) and moments (k,) of some of the other columns after the average."""
         across = self.across[index]
         return self._gram.take(index, 0).take(index, 1) - across @ across.T, self.moment[index]
 
-    def mean(self, others, values):
+    def mean(self, others: IntArray, values: FloatArray) -> FloatArray:
         """Mean (z,) of the term's coefficients where other columns (k,) have coefficients values (k,)."""
         target = self._size * (self._moment[self._index] - self._gram[self._index[:, None], others] @ values)
-        return self._size * cho_solve((self._factor, True), target, check_finite=False)
+        return np.asarray(self._size * cho_solve((self._factor, True), target, check_finite=False))
 
 
-def _factor(gram, index, size):
+def _factor(gram: FloatArray, index: IntArray, size: FloatArray) -> FloatArray:
     """Lower Cholesky factor (z, z) of I + diag(size) G diag(size) of some columns."""
-    return np.linalg.cholesky(size[:, None] * gram.take(index, 0).take(index, 1) * size + np.eye(len(size)))
+    return np.asarray(np.linalg.cholesky(size[:, None] * gram.take(index, 0).take(index, 1) * size + np.eye(len(size))))

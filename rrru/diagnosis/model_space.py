@@ -21,24 +21,29 @@ Two searches start from opposite ends, from nothing and from as many effects as 
 of causes differ between what each of them has visited says whether the answer depends on where one starts.
 """
 
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 from scipy.linalg import solve_triangular
 
+from rrru.diagnosis.aliases import BoolArray, FloatArray, IntArray
 from rrru.diagnosis.discrepancy_basis import UNKNOWN
-from rrru.diagnosis.evidence import PRIOR_SCALES, averaged
+from rrru.diagnosis.evidence import PRIOR_SCALES, ModelEvidence, averaged
 from rrru.diagnosis.evidence_kernels import log_evidence_of_blocks, log_sum_exp
 from rrru.diagnosis.hypothesis import Hypothesis
 from rrru.diagnosis.marginal_problem import posterior_mean
 from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.posterior import Posterior, Weighed, Weigher
-from rrru.diagnosis.terms import variants
+from rrru.diagnosis.settings import Prior
+from rrru.diagnosis.terms import EffectTerm, variants
 from rrru.diagnosis.whitened import DISCREPANCY_SCALES
 
 
-def explore(evidence, prior, without=(), most=OPTIONS.max_effects):
+def explore(
+    evidence: ModelEvidence, prior: Prior, without: Collection[str] = (), most: int = OPTIONS.max_effects
+) -> Posterior:
     """The Posterior over sets of up to `most` terms.
 
     evidence: ModelEvidence on the readings at which all sets compare; prior: a Prior; without: names of effects that
@@ -52,10 +57,10 @@ def explore(evidence, prior, without=(), most=OPTIONS.max_effects):
 class _Search:
     """Sets that a search has reached and those whose neighbours it has evaluated, by their terms as a set, in order."""
 
-    reached: dict = field(default_factory=dict)
-    expanded: dict = field(default_factory=dict)
+    reached: dict[frozenset[EffectTerm], None] = field(default_factory=dict)
+    expanded: dict[frozenset[EffectTerm], None] = field(default_factory=dict)
 
-    def reach(self, terms):
+    def reach(self, terms: Iterable[EffectTerm]) -> None:
         """Note that a set has been reached."""
         self.reached[frozenset(terms)] = None
 
@@ -63,23 +68,25 @@ class _Search:
 class ModelSpace:
     """Sets of terms that have been evaluated; see `explore`."""
 
-    def __init__(self, evidence, prior, without=(), most=OPTIONS.max_effects):
+    def __init__(
+        self, evidence: ModelEvidence, prior: Prior, without: Collection[str] = (), most: int = OPTIONS.max_effects
+    ) -> None:
         self._evidence, self._weigher = evidence, Weigher(evidence, prior)
         self.library = {name: effect for name, effect in evidence.library.items() if name not in without}
         self._terms = [term for effect in self.library.values() for term in variants(effect)]
         self._most = min(most, len(self.library))
-        self._known: dict[frozenset, Weighed] = {}
+        self._known: dict[frozenset[EffectTerm], Weighed] = {}
         # those whose best level has been looked for
-        self._climbed: set[frozenset] = set()
+        self._climbed: set[frozenset[EffectTerm]] = set()
         self._highest = -np.inf
         for terms in ((), *((term,) for term in self._terms)):
             self._single(terms)
 
     @cached_property
-    def _candidates(self):
+    def _candidates(self) -> "Candidates":
         return Candidates(self._evidence, self._terms)
 
-    def confirmed(self, first):
+    def confirmed(self, first: _Search) -> Posterior:
         """The Posterior after a search and one from the other end; where these differ, after one from both answers."""
         searches = [first, self.search(self.fullest())]
         found = self.posterior(searches)
@@ -90,7 +97,7 @@ class ModelSpace:
             found = self.posterior(searches)
         return found
 
-    def posterior(self, searches):
+    def posterior(self, searches: Sequence[_Search]) -> Posterior:
         """The Posterior over all sets that have been evaluated, with the difference of the two best searches."""
         found = list(self._known.values())
         result = Posterior.of(found)
@@ -103,32 +110,34 @@ class ModelSpace:
         share = sum(np.exp(self._known[key].height - result.total) for key in expanded)
         return Posterior.of(found, apart, float(share))
 
-    def search(self, start):
+    def search(self, start: Sequence[EffectTerm]) -> _Search:
         """A search from a set of terms on, until no set is left whose neighbours matter or the time is up."""
         known = {term for term in start if term in self._terms}
         found, first = _Search(), frozenset(known)
         self._evaluate(tuple(term for term in start if term in known), None, None, climb=True)
         for terms in ((), *((term,) for term in self._terms), first):
             found.reach(terms)
-        upcoming = first
+        upcoming: frozenset[EffectTerm] | None = first
         while upcoming is not None and len(found.expanded) < OPTIONS.max_expanded_sets:
             found.expanded[upcoming] = None
             self._expand(self._known[upcoming], found)
             upcoming = self._next(found)
         return found
 
-    def _next(self, found):
+    def _next(self, found: _Search) -> frozenset[EffectTerm] | None:
         """The most probable set whose neighbours have not been evaluated, None where it does not matter."""
         heights = {key: self._known[key].height for key in found.reached}
         open_sets = [key for key in heights if key not in found.expanded]
-        best = max(open_sets, key=heights.get, default=None)
+        best = max(open_sets, key=lambda key: heights[key], default=None)
         total = log_sum_exp(np.array(list(heights.values())))
         matters = best is not None and heights[best] > total + np.log(OPTIONS.min_expanded_probability)
         return best if matters else None
 
-    def fullest(self):
+    def fullest(self) -> tuple[EffectTerm, ...]:
         """The set that grows by the term that adds most, however improbable many terms are, as long as one adds."""
-        terms, level, prior_scales = (), int(self._evidence.none.argmax()), []
+        terms: tuple[EffectTerm, ...] = ()
+        prior_scales: list[float] = []
+        level = int(self._evidence.none.argmax())
         while len(terms) < self._most:
             total, best = self._gains(terms, prior_scales, level)
             row = int(total.argmax())
@@ -139,11 +148,13 @@ class ModelSpace:
             level = int(self._evidence.levels[int(np.argmax(at))])
         return terms
 
-    def _at(self, terms, prior_scales, level):
+    def _at(self, terms: Sequence[EffectTerm], prior_scales: Sequence[float] | FloatArray, level: int) -> float:
         """Log evidence of a set of terms at its prior scales and a level."""
-        return self._evidence.over_strengths(terms, [[one] for one in prior_scales], [level])[0][0, 0]
+        return float(self._evidence.over_strengths(terms, [[one] for one in prior_scales], [level])[0][0, 0])
 
-    def _gains(self, terms, prior_scales, level):
+    def _gains(
+        self, terms: Sequence[EffectTerm], prior_scales: Sequence[float] | FloatArray, level: int
+    ) -> tuple[FloatArray, FloatArray]:
         """Log evidence (c,) that each candidate adds to a set, averaged over its prior scale, and the best scale."""
         gains = self._candidates.gains(terms, prior_scales, level)
         total = np.full(len(gains), -np.inf)
@@ -151,7 +162,7 @@ class ModelSpace:
         total[may_act] = averaged(gains[may_act], 1)
         return total, PRIOR_SCALES[gains.argmax(axis=1)]
 
-    def _expand(self, centre, found):
+    def _expand(self, centre: Weighed, found: _Search) -> None:
         """Evaluate those of a set's neighbours that may matter."""
         terms, level = centre.hypothesis.terms, centre.hypothesis.level
         prior_scales, present = centre.hypothesis.prior_scales[level], centre.hypothesis.evidence.max()
@@ -176,7 +187,7 @@ class ModelSpace:
                 for row, gain in enumerate(gains.tolist())
                 if gain > -np.inf and self._candidates.terms[row] not in terms
             }
-            rows = sorted(heights, key=heights.get, reverse=True)
+            rows = sorted(heights, key=lambda row: heights[row], reverse=True)
             for rank, row in enumerate(rows):
                 if rank >= OPTIONS.min_neighbours and heights[row] < self._highest - OPTIONS.window_nats:
                     break
@@ -193,7 +204,9 @@ class ModelSpace:
                     self._evaluate(smaller, level, scales[remaining])
                     found.reach(smaller)
 
-    def _evaluate(self, terms, level, prior_scales, climb=False):
+    def _evaluate(
+        self, terms: Sequence[EffectTerm], level: int | None, prior_scales: FloatArray | None, climb: bool = False
+    ) -> None:
         """Evaluate a set of terms unless it is known: at a level, and at those next to it as long as they matter.
 
         climb: whether the best level is looked for even where the set is hopeless.
@@ -218,7 +231,7 @@ class ModelSpace:
         if climb or not hopeless:
             self._climbed.add(key)
 
-    def _single(self, terms):
+    def _single(self, terms: Sequence[EffectTerm]) -> None:
         """Evaluate no term or one at all levels."""
         evidence, best = self._evidence.none.copy(), np.ones((len(DISCREPANCY_SCALES), len(terms)))
         if terms:
@@ -228,7 +241,7 @@ class ModelSpace:
         self._know(Hypothesis(tuple(terms), evidence, best))
         self._climbed.add(frozenset(terms))
 
-    def _know(self, hypothesis):
+    def _know(self, hypothesis: Hypothesis) -> None:
         """Keep a hypothesis that has been evaluated."""
         weighed = self._weigher.weighed(hypothesis, self._highest - OPTIONS.negligible_nats)
         self._known[frozenset(hypothesis.terms)] = weighed
@@ -241,18 +254,18 @@ class Candidates:
     evidence: a ModelEvidence; terms: Terms whose effects are in its library.
     """
 
-    def __init__(self, evidence, terms):
+    def __init__(self, evidence: ModelEvidence, terms: Sequence[EffectTerm]) -> None:
         self._evidence = evidence
         broad = [evidence.library[term.effect].coordinates.broad for term in terms]
         self._broad = [term for term, many in zip(terms, broad, strict=True) if many]
         self.terms = [*(term for term, many in zip(terms, broad, strict=True) if not many), *self._broad]
 
     @cached_property
-    def _blocks(self):
+    def _blocks(self) -> tuple[IntArray, IntArray, FloatArray, BoolArray]:
         """Terms of few coefficients: columns' numbers (n,), ends (c + 1,), deviations (s, n), positive (n,)."""
         few = self.terms[: len(self.terms) - len(self._broad)]
         priors = [self._evidence.priors_of((term,)) for term in few]
-        sizes = [sum(len(prior.index) for prior in of_term) for of_term in priors]
+        sizes = [sum(len(prior.columns) for prior in of_term) for of_term in priors]
         if not priors:
             return (
                 np.zeros(0, dtype=int),
@@ -268,11 +281,11 @@ class Candidates:
         rows = [np.concatenate(scale[k :: len(PRIOR_SCALES)]) for k in range(len(PRIOR_SCALES))]
         numbers, positive = (
             np.concatenate([getattr(prior, name) for of_term in priors for prior in of_term])
-            for name in ("index", "positive")
+            for name in ("columns", "positive")
         )
         return numbers, np.cumsum([0, *sizes]), np.array(rows), positive
 
-    def gains(self, terms, prior_scales, level):
+    def gains(self, terms: Sequence[EffectTerm], prior_scales: Sequence[float] | FloatArray, level: int) -> FloatArray:
         """Log evidence (c, s) that each of `self.terms` adds at PRIOR_SCALES to a set at its prior scales and a level.
 
         -inf for terms of effects that the set has.
@@ -296,10 +309,12 @@ class Candidates:
                 result[row] = evidence.over_strengths((*terms, term), (*grids, PRIOR_SCALES), [level])[0][0] - present
         return result
 
-    def _left(self, terms, prior_scales, level):
+    def _left(
+        self, terms: Sequence[EffectTerm], prior_scales: Sequence[float] | FloatArray, level: int
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Gram matrix (K, K), moments (K,) and across (K, x): what a set leaves is the first less across across^T."""
         gram, across, moment, problem, scale = self._evidence.remaining_columns(terms, prior_scales, level)
-        if problem is None:
+        if problem is None or scale is None:
             return gram, moment, across
         shared = problem.of_coefficients(gram[problem.index] - across[problem.index] @ across.T)
         factor = np.linalg.cholesky(scale[:, None] * problem.gram[0] * scale + np.eye(len(scale)))

@@ -18,17 +18,21 @@ at the platform. Where no mass is stated there, the error is a tenth of all that
 base is level within a tenth of a degree, or it is tilted by a degree.
 """
 
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 from itertools import product
 
 import numpy as np
 
+from rrru.diagnosis.aliases import FloatArray, Grams, IntArray, WeightStep
 from rrru.diagnosis.evidence_kernels import log_sum_exp
-from rrru.diagnosis.marginal_problem import gained, posterior_covariance, posterior_mean
+from rrru.diagnosis.marginal_problem import MarginalProblem, gained, posterior_covariance, posterior_mean
 from rrru.diagnosis.options import OPTIONS
-from rrru.kinematics.dynamics import carried_kg, level_axes
+from rrru.effects.protocol import Motion
+from rrru.kinematics.dynamics import Masses, carried_kg, level_axes
 from rrru.kinematics.point_masses import PLATFORM
+from rrru.kinematics.robot import Robot
 
 # name of payload and tilt in tables of effects, and name of the mass among them
 WEIGHT, _EXTRA = "weight", "extra_kg"
@@ -39,12 +43,12 @@ _CASES = (
 )
 
 
-def weight_names(robot):
+def weight_names(robot: Robot) -> tuple[str, ...]:
     """Names of the nuisance parameters: mass at the platform, tilts of the base about the level axes."""
     return (_EXTRA, *(f"lean_{'xyz'[axis]}" for axis in level_axes(robot)))
 
 
-def nuisance_priors(motion, masses):
+def nuisance_priors(motion: Motion, masses: Masses) -> tuple[dict[str, float], dict[str, tuple[float, float]]]:
     """Standard deviations and bounds (low, high) by name of the errors of payload and tilt along a Motion.
 
     All zero where no part has mass.
@@ -58,15 +62,23 @@ def nuisance_priors(motion, masses):
     bounds = [(-OPTIONS.nuisance_bound_sd * sd, OPTIONS.nuisance_bound_sd * sd) for sd in nuisance_sd]
     least_kg = float(stated_kg.min(initial=np.inf) if len(stated_kg) else 0.0)
     bounds[0] = -OPTIONS.max_missing_mass_share * least_kg, bounds[0][1]
-    return tuple(dict(zip(weight_names(robot), values, strict=True)) for values in (nuisance_sd, bounds))
+    names = weight_names(robot)
+    return dict(zip(names, nuisance_sd, strict=True)), dict(zip(names, bounds, strict=True))
 
 
-def as_found(problem, prior_scales):
+def as_found(problem: MarginalProblem, prior_scales: FloatArray) -> FloatArray:
     """Coefficients (k,) of a MarginalProblem of one level at prior_scales (1, terms)."""
     return posterior_mean(problem, problem.scale(prior_scales)[0])
 
 
-def with_nuisance(problem, count, blocks, steps, found, grams):
+def with_nuisance(
+    problem: MarginalProblem,
+    count: int,
+    blocks: Mapping[int, tuple[FloatArray, IntArray]],
+    steps: Sequence[WeightStep],
+    found: FloatArray,
+    grams: Grams,
+) -> MarginalProblem:
     """The MarginalProblem of so many terms with the errors of payload and tilt as further coefficients.
 
     blocks: by number of a compliant term the matrix (c, k) from its k coefficients to coordinates, and the numbers
@@ -98,7 +110,7 @@ def with_nuisance(problem, count, blocks, steps, found, grams):
     return whole.on(*grams(joined["index"]))
 
 
-def gained_over_cases(problem, prior_scales):
+def gained_over_cases(problem: MarginalProblem, prior_scales: FloatArray) -> FloatArray:
     """`gained` of a MarginalProblem at prior_scales (m, terms), averaged over the cases of payload and tilt."""
     if not problem.weights:
         return gained(problem, problem.scale(prior_scales))
@@ -116,7 +128,7 @@ def gained_over_cases(problem, prior_scales):
     return result
 
 
-def mean_over_cases(problem, prior_scales):
+def mean_over_cases(problem: MarginalProblem, prior_scales: FloatArray) -> FloatArray:
     """Mean (k,) of the coefficients of a MarginalProblem of one level at prior_scales (1, terms).
 
     It is the mean of the mixture over the cases of payload and tilt, which are always free: the prior scales are raised
@@ -126,7 +138,7 @@ def mean_over_cases(problem, prior_scales):
     return share @ [posterior_mean(problem, scale) for scale in scales]
 
 
-def over_cases(problem, prior_scales):
+def over_cases(problem: MarginalProblem, prior_scales: FloatArray) -> tuple[FloatArray, FloatArray]:
     """`mean_over_cases` and the covariance (k, k), without the constraint on positive coefficients."""
     share, scales = _mixture(problem, prior_scales)
     means = np.array([posterior_mean(problem, scale) for scale in scales])
@@ -136,7 +148,7 @@ def over_cases(problem, prior_scales):
     return mean, np.einsum("c,cij->ij", share, spreads) + np.einsum("c,ci,cj->ij", share, apart, apart)
 
 
-def _mixture(problem, prior_scales):
+def _mixture(problem: MarginalProblem, prior_scales: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Posterior probabilities (c,) of the cases of free payload and tilt, and prior deviations (c, k) in each."""
     if not problem.weights:
         return np.ones(1), problem.scale(prior_scales)
@@ -145,13 +157,13 @@ def _mixture(problem, prior_scales):
     return np.exp(log - np.logaddexp.reduce(log)), scales
 
 
-def _over_cases(problem, scale):
+def _over_cases(problem: MarginalProblem, scale: FloatArray) -> FloatArray:
     """`gained` (levels, m) at prior deviations (m, k) with free payload and tilt, averaged over their cases."""
     log, scales = _in_cases(problem, scale)
     return log_sum_exp(gained(problem, scales).reshape(len(problem.gram), len(scale), len(log)) + log)
 
 
-def _in_cases(problem, scale):
+def _in_cases(problem: MarginalProblem, scale: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Logarithms (c,) of the probabilities of all cases, and prior deviations (m c, k) of rows (m, k) in each."""
     log, shares = _cases(problem.weights)
     scales = np.repeat(scale, len(log), axis=0)
@@ -159,13 +171,13 @@ def _in_cases(problem, scale):
     return log, scales
 
 
-def cases_of(names):
+def cases_of(names: Iterable[str]) -> tuple[FloatArray, FloatArray]:
     """Log probabilities (c,) of all cases, and standard deviations (c, q) of the parameters of these names."""
     return _cases(tuple(name != _EXTRA for name in names))
 
 
 @cache
-def _cases(weights):
+def _cases(weights: tuple[bool, ...]) -> tuple[FloatArray, FloatArray]:
     """Log probabilities (c,) of all cases of `MarginalProblem.weights`, and shares (c, q) of their sizes."""
     kinds = sorted(set(weights))
     combined = list(product(_CASES, repeat=len(kinds)))

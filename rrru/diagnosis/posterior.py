@@ -1,15 +1,20 @@
 """Posterior probabilities of effects, of sets of them, and of a discrepancy, from the evidence of hypotheses."""
 
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 
+from rrru.diagnosis.aliases import BoolArray, CauseSet, FloatArray
 from rrru.diagnosis.discrepancy_basis import UNKNOWN
+from rrru.diagnosis.evidence import ModelEvidence
 from rrru.diagnosis.evidence_kernels import log_sum_exp
-from rrru.diagnosis.hypothesis import Hypothesis
+from rrru.diagnosis.hypothesis import Answer, Hypothesis
 from rrru.diagnosis.options import OPTIONS
-from rrru.diagnosis.terms import EACH, SAME, variants
+from rrru.diagnosis.settings import Prior
+from rrru.diagnosis.terms import EACH, SAME, EffectTerm, shape_probabilities, variants
 from rrru.diagnosis.whitened import discrepancy_scales
 
 
@@ -18,11 +23,11 @@ class Weighed:
     """A Hypothesis with the logarithms (levels,) of its weights, and at which levels something is unexplained."""
 
     hypothesis: Hypothesis
-    log_weights: np.ndarray
-    unexplained: np.ndarray
+    log_weights: FloatArray
+    unexplained: BoolArray
 
     @cached_property
-    def height(self):
+    def height(self) -> float:
         """Logarithm of the sum of its weights."""
         return float(log_sum_exp(self.log_weights))
 
@@ -35,14 +40,14 @@ class Posterior:
     the sets all of whose neighbours have been looked at.
     """
 
-    hypotheses: tuple
-    log_weights: np.ndarray
-    unexplained: np.ndarray
+    hypotheses: tuple[Hypothesis, ...]
+    log_weights: FloatArray
+    unexplained: BoolArray
     apart: float = 0.0
     expanded: float = 1.0
 
     @classmethod
-    def of(cls, weighed, apart=0.0, expanded=1.0):
+    def of(cls, weighed: Sequence[Weighed], apart: float = 0.0, expanded: float = 1.0) -> Self:
         """The Posterior of a list of Weighed hypotheses without negligible sets of several effects.
 
         Single effects stay, however improbable: tables show each of them alone.
@@ -53,22 +58,22 @@ class Posterior:
         return cls(tuple(one.hypothesis for one in chosen), weights, flags, apart, expanded)
 
     @property
-    def total(self):
+    def total(self) -> float:
         """Logarithm of the sum of all weights, up to the constant."""
         return float(log_sum_exp(self.log_weights.ravel()))
 
     @cached_property
-    def weights(self):
+    def weights(self) -> FloatArray:
         """Weights (h, levels) that sum to one."""
         return np.exp(self.log_weights - self.total)
 
-    def best(self):
+    def best(self) -> Answer:
         """The hypothesis of highest weight and its level (an index)."""
         return self._best(range(len(self.hypotheses)), self.log_weights)
 
-    def sets(self):
+    def sets(self) -> dict[CauseSet, float]:
         """Probability by (frozenset of effects, unexplained), highest first."""
-        result = {}
+        result: dict[CauseSet, float] = {}
         for hypothesis, weight, unexplained in zip(self.hypotheses, self.weights, self.unexplained, strict=True):
             for flag in (False, True):
                 if (unexplained == flag).any():
@@ -77,36 +82,36 @@ class Posterior:
         return dict(sorted(result.items(), key=lambda item: (-item[1], sorted(item[0][0]), item[0][1])))
 
     @property
-    def probability_unexplained(self):
+    def probability_unexplained(self) -> float:
         """Probability that something acts that the library does not hold."""
         return sum(p for (_, flag), p in self.sets().items() if flag)
 
-    def marginal(self, effect):
+    def marginal(self, effect: str) -> float:
         """Probability that an effect acts."""
         return float(self.weights[self._holding(effect)].sum())
 
-    def any_of(self, effects):
+    def any_of(self, effects: Iterable[str]) -> float:
         """Probability that at least one of some effects acts."""
         return float(self.weights[np.any([self._holding(effect) for effect in effects], axis=0)].sum())
 
-    def both(self, first, second):
+    def both(self, first: str, second: str) -> float:
         """Probability that two effects act together."""
         return float(self.weights[self._holding(first) & self._holding(second)].sum())
 
-    def without(self, effect):
+    def without(self, effect: str) -> "Posterior":
         """The posterior with an effect ruled out."""
         keep = ~self._holding(effect)
         remaining = tuple(h for h, keeps in zip(self.hypotheses, keep, strict=True) if keeps)
         return Posterior(remaining, self.log_weights[keep], self.unexplained[keep], self.apart, self.expanded)
 
     @property
-    def height(self):
+    def height(self) -> float:
         """Logarithm of the highest weight, up to the constant."""
         return float(self.log_weights.max(initial=-np.inf))
 
-    def legs(self, effect):
+    def legs(self, effect: str) -> dict[str | int, float]:
         """Probability by legs ("each", "same", 1, 2, 3) of an effect, given that it acts."""
-        result = {}
+        result: dict[str | int, float] = {}
         for hypothesis, weight in zip(self.hypotheses, self.weights, strict=True):
             for term in hypothesis.terms:
                 if term.effect == effect:
@@ -114,7 +119,7 @@ class Posterior:
         total = sum(result.values())
         return {legs: p / total for legs, p in result.items()} if total > 0.0 else {}
 
-    def best_of(self, effects, unexplained=None):
+    def best_of(self, effects: frozenset[str], unexplained: bool | None = None) -> Answer | None:
         """The hypothesis of highest weight with exactly these effects, and its level; None where there is none.
 
         Unless `unexplained` is asked for, one without discrepancy functions.
@@ -128,7 +133,7 @@ class Posterior:
             weights = np.where(self.unexplained[rows] == unexplained, weights, -np.inf)
         return self._best(rows, weights)
 
-    def best_where(self, condition):
+    def best_where(self, condition: Callable[[frozenset[str]], bool]) -> Answer | None:
         """The hypothesis of highest weight without discrepancy functions whose effects meet a condition, and its level.
 
         condition: from a frozenset of names to a bool. None where there is none.
@@ -140,12 +145,12 @@ class Posterior:
         ]
         return self._best(rows, self.log_weights[rows]) if rows else None
 
-    def _best(self, rows, weights):
+    def _best(self, rows: Sequence[int], weights: FloatArray) -> Answer:
         """The hypothesis among some rows (k) of highest weight (k, levels), and its level (an index)."""
         row, level = np.unravel_index(weights.argmax(), weights.shape)
-        return self.hypotheses[rows[row]], int(level)
+        return self.hypotheses[rows[int(row)]], int(level)
 
-    def _holding(self, effect):
+    def _holding(self, effect: str) -> BoolArray:
         """Which hypotheses (h,) contain an effect."""
         return np.array([effect in h.effects for h in self.hypotheses])
 
@@ -156,19 +161,19 @@ class Weigher:
     evidence: the ModelEvidence that hypotheses are of.
     """
 
-    def __init__(self, evidence, prior):
+    def __init__(self, evidence: ModelEvidence, prior: Prior) -> None:
         library = evidence.library
         self._evidence, self._levels = evidence, discrepancy_scales(evidence.noise)
-        self._prior, self._effects = prior, {}
+        self._prior = prior
+        self._effects: dict[str, FloatArray] = {}
         self._legs = {name: len(np.unique(effect.coordinates.legs)) for name, effect in library.items()}
         self._functions = sum(name in UNKNOWN for name in library)
         for name in library.keys() - UNKNOWN.keys():
             kinds = {term.legs if isinstance(term.legs, str) else "one" for term in variants(library[name])}
             coordinates = library[name].coordinates
-            weights = coordinates.weights or np.full(len(coordinates.shapes), 1.0 / len(coordinates.shapes))
-            self._effects[name] = np.log(weights) - np.log(len(kinds)) + coordinates.log_prior
+            self._effects[name] = np.log(shape_probabilities(coordinates)) - np.log(len(kinds)) + coordinates.log_prior
 
-    def weighed(self, hypothesis, least=-np.inf):
+    def weighed(self, hypothesis: Hypothesis, least: float = -np.inf) -> Weighed:
         """The Weighed hypothesis; least: log weight below which it counts as unexplained without a test."""
         evidence, log_weights = self._evidence, hypothesis.evidence + self.terms(hypothesis.terms)
         if not log_weights.max() > least:
@@ -178,7 +183,7 @@ class Weigher:
             unexplained = tolerated < np.maximum(self._levels, evidence.explained(hypothesis, set(UNKNOWN)))
         return Weighed(hypothesis, log_weights + self._of_levels(unexplained), unexplained)
 
-    def terms(self, terms):
+    def terms(self, terms: Sequence[EffectTerm]) -> float:
         """Logarithm of the prior probability of a set of terms, whatever the discrepancy."""
         known = [term for term in terms if term.effect not in UNKNOWN]
         total = self._prior.log_set(len(known), len(self._effects))
@@ -187,9 +192,9 @@ class Weigher:
             total += self._effects[term.effect][term.shape]
             if term.legs not in (EACH, SAME):
                 total -= np.log(self._legs[term.effect])
-        return total
+        return float(total)
 
-    def _of_levels(self, unexplained):
+    def _of_levels(self, unexplained: BoolArray) -> FloatArray:
         """Log prior (levels,) of the discrepancy's levels: half of the part that is not unexplained has none at all."""
         if unexplained.all():
             # the prior of its discrepancy function has been counted
@@ -200,4 +205,4 @@ class Weigher:
             result[0] = explained * 0.5
         if unexplained.any():
             result[unexplained] = self._prior.unexplained / unexplained.sum()
-        return np.log(result)
+        return np.asarray(np.log(result))

@@ -4,9 +4,10 @@ The model with effects is the exact closure of the robot. A hypothesis is fitted
 about the best one found. Lengths in mm, angles in rad.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
+from typing import Self
 
 import numpy as np
 import pandas as pd
@@ -15,23 +16,28 @@ from rrru.cache import last_cached_of
 from rrru.campaign import measurements as rows
 from rrru.campaign.driven_path import follows_path, passes_points, stops
 from rrru.campaign.noise import reading_series
+from rrru.diagnosis.aliases import BoolArray, EffectKey, FloatArray, IntArray
 from rrru.diagnosis.approach_direction import estimate_approach, has_direction
-from rrru.diagnosis.discrepancy_basis import UNKNOWN
+from rrru.diagnosis.discrepancy_basis import Library, Unknown
 from rrru.diagnosis.evidence import ModelEvidence
 from rrru.diagnosis.linearise import approach_responses, linearised
 from rrru.diagnosis.options import OPTIONS
+from rrru.diagnosis.state import LinearizedProblem, ModelState
 from rrru.effects.motion import standing
-from rrru.effects.protocol import Contribution, Motion
+from rrru.effects.protocol import Contribution, Effect, Motion
 from rrru.estimation.noise_model import NoiseModel
 from rrru.estimation.parameters import Block
-from rrru.kinematics.readings import lacking
+from rrru.kinematics.chain import Poses
+from rrru.kinematics.parameter_jacobian import TwistMap
+from rrru.kinematics.readings import Readings, lacking
+from rrru.kinematics.robot import Robot
 
 # name of the block of geometric errors
 GEOMETRY = "geometry"
 
 
 @dataclass(frozen=True)
-class Case:
+class DiagnosisProblem:
     """Points of a campaign, all N of them, of which the used ones are fitted.
 
     What was read at them makes m rows of three numbers in mm: positions, and after them orientations at their arm.
@@ -45,27 +51,27 @@ class Case:
     needs, of the effects that lack something at a used point; massless: whether no mass of the robot itself is stated.
     """
 
-    mechanism: object
+    mechanism: Robot
     measurements: pd.DataFrame
     motion: Motion
-    used: np.ndarray
-    library: dict
-    untestable: dict
+    used: BoolArray
+    library: Library
+    untestable: dict[str, str]
     noise_mm: float
     arm_mm: float = np.nan
     noise: NoiseModel | None = None
     beside_scale: float = 1.0
-    motion_at: Callable | None = None
-    nuisance_sd: dict = field(default_factory=dict)
-    bounds: dict = field(default_factory=dict)
-    known: dict = field(default_factory=dict)
+    motion_at: Callable[..., Motion] | None = None
+    nuisance_sd: Mapping[str, float] = field(default_factory=dict)
+    bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    known: Mapping[str, BoolArray] = field(default_factory=dict)
     massless: bool = False
 
-    def __len__(self):
+    def __len__(self) -> int:
         return len(self.at)
 
     @cached_property
-    def geometry(self):
+    def geometry(self) -> Block:
         """The Block of geometric errors: links and joints are off by less than frames, targets and drives' zeros."""
         block = Block.geometry(self.mechanism.parameters, GEOMETRY)
         if not self.mechanism.stages:
@@ -74,35 +80,35 @@ class Case:
         body_sd = np.minimum(block.sd, [usual[unit] for unit in block.units])
         return replace(block, sd=np.where(self.mechanism.stages[-1], block.sd, body_sd))
 
-    @property
-    def effects(self):
+    @cached_property
+    def effects(self) -> dict[str, Effect]:
         """The library without the functions of the discrepancy."""
-        return {name: effect for name, effect in self.library.items() if name not in UNKNOWN}
+        return {name: effect for name, effect in self.library.items() if not isinstance(effect, Unknown)}
 
     @cached_property
-    def readings(self):
+    def readings(self) -> Readings | None:
         """What was read at all points, None where that are positions of the tool."""
         return rows.readings(self.measurements, self.arm_mm)
 
     @cached_property
-    def _used_rows(self):
+    def _used_rows(self) -> IntArray:
         """Rows (m,) of the used points among those of all readings."""
         points = np.arange(len(self.used)) if self.readings is None else self.readings.rows
         return np.flatnonzero(self.used[points])
 
     @cached_property
-    def along_paths(self):
+    def along_paths(self) -> bool:
         """Whether the points lie along paths, not in any order."""
         command, run = rows.command(self.measurements), self.measurements["run"].to_numpy()
-        return passes_points(self.measurements) or follows_path(command, run)
+        return bool(passes_points(self.measurements) or follows_path(command, run))
 
     @cached_property
-    def on_world(self):
+    def on_world(self) -> BoolArray:
         """Which rows (m,) are of reflectors that are not on the robot."""
         flags = rows.on_the_world(self.measurements)
         return np.zeros(len(self), dtype=bool) if flags is None else flags[self.at]
 
-    def of_rows(self, values):
+    def of_rows(self, values: FloatArray) -> FloatArray:
         """Values (m, 3, ..) of the used rows, weighted, from those (n, 3, ..) of all that was read."""
         used = values[self._used_rows]
         if self.beside_scale == 1.0:
@@ -111,17 +117,17 @@ class Case:
         return used * scale.reshape(-1, *[1] * (used.ndim - 1))
 
     @cached_property
-    def at(self):
+    def at(self) -> IntArray:
         """Number (m,) of the point that each row was read at."""
         return self._used_rows if self.readings is None else self.readings.rows[self._used_rows]
 
     @cached_property
-    def stop(self):
+    def stop(self) -> IntArray:
         """Number (m,) of the stop that each row was read at: several reflectors may be seen at one."""
-        return stops(self.measurements)[self.at]
+        return np.asarray(stops(self.measurements)[self.at])
 
     @cached_property
-    def kind(self):
+    def kind(self) -> IntArray:
         """Number (m,) of the target of each row, orientations apart."""
         target = np.zeros(len(self), dtype=int)
         if "target" in self.measurements:
@@ -129,36 +135,36 @@ class Case:
         return 2 * target + ~self.positions
 
     @cached_property
-    def positions(self):
+    def positions(self) -> BoolArray:
         """Which rows (m,) are positions."""
         return self._used_rows < len(self.used)
 
     @cached_property
-    def on_robot(self):
+    def on_robot(self) -> BoolArray:
         """Which rows (m,) are positions of points on the robot, the only ones that stated distances in mm are about."""
         return self.positions & ~self.on_world
 
     @property
-    def count(self):
+    def count(self) -> int:
         """Number of used points."""
         return int(self.used.sum())
 
     @property
-    def points(self):
+    def points(self) -> pd.DataFrame:
         """The measurement table, row by row of what was read (m)."""
         return self.measurements.iloc[self.at]
 
     @property
-    def run(self):
+    def run(self) -> IntArray:
         """Run numbers (m,)."""
-        return self.measurements["run"].to_numpy()[self.at]
+        return np.asarray(self.measurements["run"].to_numpy()[self.at])
 
     @cached_property
-    def series(self):
+    def series(self) -> IntArray:
         """Numbers (m,) of what follows one another smoothly: runs, of each reflector, orientations apart."""
-        return reading_series(self.measurements, self.readings)[self._used_rows]
+        return np.asarray(reading_series(self.measurements, self.readings)[self._used_rows])
 
-    def by_point(self, values):
+    def by_point(self, values: FloatArray) -> FloatArray:
         """Values (n, 3 or 6, ..) of used points from those (m, 3, ..) of rows, zero where no orientation was read."""
         if self.positions.all():
             return values
@@ -167,29 +173,29 @@ class Case:
         result[np.searchsorted(np.flatnonzero(self.used), self.at[~self.positions]), 3:] = values[~self.positions]
         return result
 
-    def under(self, noise):
-        """The case under a NoiseModel."""
+    def under(self, noise: NoiseModel) -> Self:
+        """The problem under a NoiseModel."""
         return replace(self, noise=noise, noise_mm=noise.mean_mm)
 
-    def evidence(self, linear):
+    def evidence(self, linear: LinearizedProblem) -> ModelEvidence:
         """The ModelEvidence on a linearisation."""
         noise = (self.noise or NoiseModel.white(self.noise_mm)).counted
         rows = {name: known[self.at] for name, known in self.known.items() if name in self.library}
         incomplete = {name: known for name, known in rows.items() if not known.all()}
         return ModelEvidence(self.library, linear, self.series, noise, self.along_paths, incomplete)
 
-    def complete(self, effects):
+    def complete(self, effects: Iterable[str]) -> BoolArray:
         """Rows (m,) at which the campaign has all that some effects need."""
         needed = (self.known[name][self.at] for name in sorted(set(effects) & set(self.known)))
-        return np.all([np.ones(len(self), dtype=bool), *needed], axis=0)
+        return np.asarray(np.all([np.ones(len(self), dtype=bool), *needed], axis=0))
 
-    def at_complete(self, effects):
-        """The case of the points alone at which the campaign has all that some effects need."""
+    def at_complete(self, effects: Iterable[str]) -> Self:
+        """The problem of the points alone at which the campaign has all that some effects need."""
         rows = self.complete(effects)
         return self if rows.all() else self.without(~rows)
 
-    def with_approach(self, state):
-        """The case with the senses in which the drives arrive, as a state and the readings determine them."""
+    def with_approach(self, state: ModelState) -> Self:
+        """The problem with the senses in which the drives arrive, as a state and the readings determine them."""
         if not np.isfinite(self.motion.approach).any():
             return self
         approach = np.where(np.isfinite(self.motion.approach), 0.0, np.nan)
@@ -198,72 +204,75 @@ class Case:
         return replace(self, motion=replace(self.motion, approach=approach))
 
     @property
-    def axis_mm(self):
+    def axis_mm(self) -> FloatArray:
         """Deviation (3,) of the noise of each axis."""
         return np.full(3, self.noise_mm) if self.noise is None else self.noise.axis_mm
 
-    def standing(self, state):
-        """The case with the loads where the robot of a state stands, if its platform can turn.
+    def standing(self, state: ModelState) -> Self:
+        """The problem with the loads where the robot of a state stands, if its platform can turn.
 
         Where positions alone were read, the orientation of the platform is not identifiable and does not count.
         Derivatives of the loads by payload and tilt stay as they were: a sag changes them by a share of itself.
         """
-        if not self.mechanism.orients:
+        if self.motion_at is None or not self.mechanism.orients:
             return self
         at = standing(self.mechanism, self.driven, self.posed(state), self.readings is not None)
-        same = {"load_slopes": partial(getattr, self.motion, "slopes"), "approach": self.motion.approach}
-        return replace(self, motion=replace(self.motion_at(at), **same))
+        slopes, approach = partial(getattr, self.motion, "slopes"), self.motion.approach
+        return replace(self, motion=replace(self.motion_at(at), load_slopes=slopes, approach=approach))
 
-    def without(self, dropped):
-        """The case without the used points of the rows flagged in (m,)."""
+    def without(self, dropped: BoolArray) -> Self:
+        """The problem without the used points of the rows flagged in (m,)."""
         used = self.used.copy()
         used[self.at[dropped]] = False
         return replace(self, used=used)
 
     @cached_property
-    def driven(self):
+    def driven(self) -> tuple[FloatArray, FloatArray]:
         """Actuator values (N, K) and commanded positions (N, 3)."""
         return rows.actuators(self.measurements, self.mechanism), rows.command(self.measurements)
 
     @cached_property
-    def _measured(self):
+    def _measured(self) -> FloatArray:
         """Measured positions (N, 3)."""
         return rows.measured(self.measurements)
 
-    def model_positions(self, deviations):
+    def model_positions(self, deviations: FloatArray) -> FloatArray:
         """Positions (N, 3) of the tool by the calibrated model without effects."""
         actuators, command = self.driven
         return self.mechanism.forward(actuators, deviations, command)
 
-    def weight(self, state):
+    def weight(self, state: ModelState) -> dict[str, float]:
         """Errors of payload and tilt of a state, by name."""
         return dict.fromkeys(self.nuisance_sd, 0.0) | state.weight
 
     @last_cached_of
-    def contributions(self, state):
+    def contributions(self, state: ModelState) -> dict[EffectKey, Contribution]:
         """What each effect of a state, (name, shape), changes along the motion."""
         return {key: state.contribution(self.library, key, self.motion) for key in state.effects}
 
     @last_cached_of
-    def contribution(self, state):
+    def contribution(self, state: ModelState) -> Contribution:
         """What the effects of a state change along the motion."""
         return sum(self.contributions(state).values(), Contribution())
 
     @last_cached_of
-    def posed(self, state):
+    def posed(self, state: ModelState) -> tuple[Poses, FloatArray]:
         """Poses (N) of the exact closure corrected by a state, and the twists of deviations and effects."""
         actuators, command = self.driven
         twists = self.mechanism.twists(state.deviations) + self.contribution(state).twists
         return self.mechanism.solve(actuators, command, twists), twists
 
-    def map_of(self, state):
+    def map_of(self, state: ModelState) -> TwistMap:
         """The TwistMap of all points at a state's poses; see `rrru.kinematics.robot.Robot.map`."""
         actuators, _ = self.driven
         if self.readings is None and not state.effects:
-            return self.mechanism.map_at(actuators, self.model_positions(state.deviations), state.deviations)
-        return self.mechanism.map(actuators, *self.posed(state), self.readings)
+            position = self.model_positions(state.deviations)
+            of_positions: TwistMap = self.mechanism.map_at(actuators, position, state.deviations)
+            return of_positions
+        result: TwistMap = self.mechanism.map(actuators, *self.posed(state), self.readings)
+        return result
 
-    def left(self, state):
+    def left(self, state: ModelState) -> FloatArray:
         """Readings minus the model corrected by a state, of all points: positions (N, 3), then orientations.
 
         The model is the exact closure where the state has effects, the calibrated one where it has none.
@@ -273,16 +282,16 @@ class Case:
         model = self.mechanism.measured(*self.posed(state)) if state.effects else self.model_positions(state.deviations)
         return self._measured - model
 
-    def by_other(self, robot, poses, twists):
+    def by_other(self, robot: Robot, poses: Poses, twists: FloatArray) -> FloatArray:
         """Readings minus another robot at Poses (N) under twists (N or 1, sites, 6), of the used points (m, 3)."""
         if self.readings is not None:
             return self.of_rows(lacking(robot, self.readings, poses, twists))
         return self.of_rows(self._measured - robot.measured(poses, twists))
 
-    def residual(self, state):
+    def residual(self, state: ModelState) -> FloatArray:
         """`left` of the used points (m, 3)."""
         return self.of_rows(self.left(state))
 
-    def linearise(self, state, keys=None):
+    def linearise(self, state: ModelState, keys: Iterable[EffectKey] | None = None) -> LinearizedProblem:
         """The model linearised about a state, see `rrru.diagnosis.linearise`."""
         return linearised(self, state, keys)

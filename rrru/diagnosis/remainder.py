@@ -8,6 +8,7 @@ Gaussian Processes for Machine Learning, 2006, sec. 8.3); a and l have the highe
 fold, a fifth of all stretches of five points, is predicted from the others.
 """
 
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,8 +16,13 @@ import pandas as pd
 from scipy.linalg import solve_triangular
 from scipy.spatial.distance import cdist
 
+from rrru.diagnosis.aliases import BoolArray, FloatArray, IntArray
 from rrru.diagnosis.heldout import within
+from rrru.diagnosis.inference import InferenceResult
 from rrru.diagnosis.options import OPTIONS
+from rrru.diagnosis.problem import DiagnosisProblem
+from rrru.diagnosis.state import LinearizedProblem
+from rrru.effects.protocol import Effect
 from rrru.robots.drive_words import drive_words
 
 COLUMNS = ("follows", "explained", "scale", "unit", "rms_mm")
@@ -33,37 +39,39 @@ class _Variable:
     """
 
     follows: str
-    value: np.ndarray
+    value: FloatArray
     unit: str
     drive: int | None = None
     steps: bool = False
 
 
-def remainder_rows(inference):
+def remainder_rows(inference: InferenceResult) -> pd.DataFrame:
     """Rows of `gap_remainder` without the campaign, the variable that explains most first.
 
     explained: share of the mean square, noise taken off, that is predicted at left-out points, 0 to 1; scale: distance
     over which the function changes, in the unit of its variable, NaN for steps; rms_mm: of the prediction.
     """
-    case = inference.case
-    rows = case.on_robot
+    problem = inference.problem
+    rows = problem.on_robot
     linear = inference.evidence.linear
     # a fit with a smooth discrepancy leaves to that what the calibration could absorb
-    left, drive = _without_calibration(case.residual(inference.state), linear, rows), linear.drive[rows]
-    stretch = within(case.run, case.stop) // OPTIONS.points_per_stretch + case.run
+    left, drive = _without_calibration(problem.residual(inference.state), linear, rows), linear.drive[rows]
+    stretch = within(problem.run, problem.stop) // OPTIONS.points_per_stretch + problem.run
     fold = (stretch % OPTIONS.stretch_folds)[rows]
-    beyond = (left**2).sum() - left.size * case.noise_mm**2
+    beyond = (left**2).sum() - left.size * problem.noise_mm**2
     result = []
-    for variable in _variables(case, rows) if beyond > 0.0 else ():
-        predicted, scale = _predicted(variable, left, drive, fold, case.noise_mm)
-        explained = 1.0 - (((left - predicted) ** 2).sum() - left.size * case.noise_mm**2) / beyond
+    for variable in _variables(problem, rows) if beyond > 0.0 else ():
+        predicted, scale = _predicted(variable, left, drive, fold, problem.noise_mm)
+        explained = 1.0 - (((left - predicted) ** 2).sum() - left.size * problem.noise_mm**2) / beyond
         rms = float(np.sqrt((predicted**2).sum(axis=1).mean()))
         result.append((variable.follows, float(np.clip(explained, 0.0, 1.0)), scale, variable.unit, rms))
     result.sort(key=lambda row: -row[1])
     return pd.DataFrame(result, columns=COLUMNS)
 
 
-def followed_alike(inference, rows, names):
+def followed_alike(
+    inference: InferenceResult, rows: pd.DataFrame, names: Collection[str]
+) -> tuple[tuple[str, ...], float]:
     """Which of some effects of the fit follow the same variable as the remainder, and the remainder's rms in mm.
 
     rows: of `gap_remainder`; names: of effects. It is for a remainder of which one variable predicts most. An effect is
@@ -74,9 +82,9 @@ def followed_alike(inference, rows, names):
     best = rows.iloc[0] if len(rows) else None
     if best is None or best["explained"] < OPTIONS.min_followed_share:
         return (), 0.0
-    case, linear, state = inference.case, inference.evidence.linear, inference.state
-    on_robot = case.on_robot
-    variable = next(one for one in _variables(case, on_robot) if one.follows == best["follows"])
+    problem, linear, state = inference.problem, inference.evidence.linear, inference.state
+    on_robot = problem.on_robot
+    variable = next(one for one in _variables(problem, on_robot) if one.follows == best["follows"])
     scaled = dict(_functions(variable))
     functions = scaled[best["scale"]] if best["scale"] in scaled else next(iter(scaled.values()))
     design = _design(variable, functions, linear.drive[on_robot]).reshape(3 * int(on_robot.sum()), -1)
@@ -86,31 +94,31 @@ def followed_alike(inference, rows, names):
         fitted = design @ np.linalg.lstsq(design, part, rcond=1e-3)[0]
         if (
             key[0] in names
-            and _depends_on(case.effects[key[0]], best["follows"])
+            and _depends_on(problem.effects[key[0]], best["follows"])
             and ((part - fitted) ** 2).sum() < (1.0 - OPTIONS.min_followed_share) * (part**2).sum()
         ):
             found.append(key[0])
     return tuple(found), float(best["rms_mm"]) if found else 0.0
 
 
-def _without_calibration(values, linear, rows):
+def _without_calibration(values: FloatArray, linear: LinearizedProblem, rows: BoolArray) -> FloatArray:
     """Residuals of values (m, 3) at some rows after a plain least-squares calibration there."""
     chosen = values[rows]
     columns = linear.base[rows].reshape(chosen.size, -1)
     size = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
     fitted = columns / size @ np.linalg.lstsq(columns / size, chosen.ravel(), rcond=1e-9)[0]
-    return chosen - fitted.reshape(chosen.shape)
+    return np.asarray(chosen - fitted.reshape(chosen.shape))
 
 
-def _depends_on(effect, follows):
+def _depends_on(effect: Effect, follows: str) -> bool:
     """Whether an effect depends on the variable, in words, and on no other except those that it determines."""
     return "time_s" in effect.needs if follows == "the time" else not effect.needs
 
 
-def _variables(case, rows):
-    """The variables that may be followed at some rows (m,) of a case, those that do not change left out."""
-    motion, at = case.motion, case.at[rows]
-    words, units = drive_words(case.mechanism), case.mechanism.parts.units
+def _variables(problem: DiagnosisProblem, rows: BoolArray) -> list[_Variable]:
+    """The variables that may be followed at some rows (m,) of a problem, those that do not change left out."""
+    motion, at = problem.motion, problem.at[rows]
+    words, units = drive_words(problem.mechanism), problem.mechanism.parts.units
     names = words.all_names
     found = [
         _Variable(f"the value of {name}", motion.drive[at, k : k + 1], unit, k)
@@ -119,33 +127,37 @@ def _variables(case, rows):
     found.append(_Variable("the place", motion.position_mm[at], "mm"))
     found.append(_Variable("the time", motion.time_s[at][:, None], "s"))
     found.append(_Variable("the payload", motion.payload_kg[at][:, None], "kg"))
-    speed = case.points["speed_mm_s"].to_numpy(dtype=float)[rows]
+    speed = problem.points["speed_mm_s"].to_numpy(dtype=float)[rows]
     found.append(_Variable("the speed", speed[:, None], "mm/s"))
     sense = np.sign(np.where(np.abs(motion.drive_rate[at]) > OPTIONS.min_drive_rate, motion.drive_rate[at], 0.0))
     found.append(_Variable("the sense of motion of the drives", sense, "1", steps=True))
     return [one for one in found if np.isfinite(one.value).all() and np.ptp(one.value, axis=0).max() > 0.0]
 
 
-def _predicted(variable, left, drive, fold, noise_mm):
+def _predicted(
+    variable: _Variable, left: FloatArray, drive: FloatArray, fold: IntArray, noise_mm: float
+) -> tuple[FloatArray, float]:
     """What a function of a variable predicts (m, 3) of the rows left out in each fold, and its scale.
 
     left (m, 3): the remainder; fold (m,): of its rows; drive (m, 3, K): derivative by the actuator values.
     """
-    best = -np.inf, None, np.nan
+    highest, best = -np.inf, None
     size = float(np.sqrt((left**2).mean()))
     for scale, functions in _functions(variable):
         design = _design(variable, functions, drive)
         unit = size / max(float(np.sqrt((design**2).sum(axis=-1).mean())), 1e-300)
-        problem = _Regression(design * unit, left, noise_mm)
+        regression = _Regression(design * unit, left, noise_mm)
         for amplitude in _AMPLITUDES:
-            evidence = problem.log_evidence(amplitude)
-            if evidence > best[0]:
-                best = evidence, (problem, amplitude), scale
-    problem, amplitude = best[1]
-    return problem.left_out(fold, amplitude), best[2]
+            evidence = regression.log_evidence(amplitude)
+            if evidence > highest:
+                highest, best = evidence, (regression, amplitude, scale)
+    # a variable that changes has functions of finite evidence
+    assert best is not None
+    regression, amplitude, scale = best
+    return regression.left_out(fold, amplitude), scale
 
 
-def _design(variable, functions, drive):
+def _design(variable: _Variable, functions: FloatArray, drive: FloatArray) -> FloatArray:
     """What functions (m, f) of a variable make of the positions (m, 3, k); drive (m, 3, K): derivative by drives."""
     if variable.steps:
         return drive * functions[:, None, :]
@@ -157,7 +169,7 @@ def _design(variable, functions, drive):
     return (functions[:, None, None, :] * np.eye(3)[:, :, None]).reshape(len(functions), 3, -1)
 
 
-def _functions(variable):
+def _functions(variable: _Variable) -> Iterator[tuple[float, FloatArray]]:
     """Pairs of a scale and functions (m, f) at the values, whose independent unit coefficients make the process."""
     value = variable.value
     if variable.steps:
@@ -173,7 +185,7 @@ def _functions(variable):
         yield scale, solve_triangular(factor, across, lower=True).T
 
 
-def _inducing(value):
+def _inducing(value: FloatArray) -> FloatArray:
     """Some of the values (m, d), each the one that is farthest from those before it."""
     value = np.unique(value, axis=0)
     count = min(OPTIONS.remainder_points, len(value))
@@ -187,21 +199,21 @@ def _inducing(value):
 class _Regression:
     """Least squares of coefficients with a normal prior: design (m, 3, f), data (m, 3), noise per number."""
 
-    def __init__(self, design, data, noise_mm):
+    def __init__(self, design: FloatArray, data: FloatArray, noise_mm: float) -> None:
         self._design, self._data, self._variance = design, data, noise_mm**2
         flat = design.reshape(-1, design.shape[-1])
         self._gram, self._moment = flat.T @ flat, flat.T @ data.ravel()
         self._value, self._turned = np.linalg.eigh(self._gram)
         self._value = np.maximum(self._value, 0.0)
 
-    def log_evidence(self, amplitude):
+    def log_evidence(self, amplitude: float) -> float:
         """Log marginal likelihood over that of no coefficients, under their prior deviation."""
         ratio = amplitude**2 / self._variance
         along = self._turned.T @ self._moment
         gained = (along**2 * ratio / (1.0 + ratio * self._value)).sum() / self._variance
         return 0.5 * float(gained - np.log1p(ratio * self._value).sum())
 
-    def left_out(self, fold, amplitude):
+    def left_out(self, fold: IntArray, amplitude: float) -> FloatArray:
         """Predictions (m, 3) of each fold by the others."""
         result, penalty = np.empty_like(self._data), self._variance / amplitude**2 * np.eye(len(self._gram))
         for number in np.unique(fold):

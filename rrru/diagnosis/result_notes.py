@@ -2,16 +2,23 @@
 omitted-variable bias of a calibration without an effect of how the campaign was measured. Lengths mm, angles rad.
 """
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from rrru.campaign.ingest.zero_offsets import LARGE
 from rrru.campaign.noise import repeat_noise
+from rrru.diagnosis.aliases import FloatArray
+from rrru.diagnosis.inference import InferenceResult
 from rrru.diagnosis.make_problem import UNLOADED
 from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.payload_nuisance import WEIGHT
-from rrru.diagnosis.problem import GEOMETRY
+from rrru.diagnosis.posterior import Posterior
+from rrru.diagnosis.problem import GEOMETRY, DiagnosisProblem
 from rrru.effects.protocol import is_compliance
+from rrru.estimation.estimate import Estimate
 from rrru.kinematics.legs import WORLD
+from rrru.kinematics.robot import Robot
 
 # said where an effect depends on loads of a robot whose file states no masses
 MASSES_UNKNOWN = (
@@ -22,7 +29,7 @@ MASSES_UNKNOWN = (
 REPEATABILITY_UNKNOWN = "repeatability is unknown: no pose was measured twice"
 
 
-def zero_notes(estimate, robot):
+def zero_notes(estimate: Estimate, robot: Robot) -> Iterator[str]:
     """Sentences on drives whose zeros are far off, such as "joint 4: zero, or the part that it moves, is off by 2
     degrees (95 %: 1.98 to 2.02)".
 
@@ -55,14 +62,14 @@ def zero_notes(estimate, robot):
             yield f"{drive.site}: zero, or the part that it moves, is off by {size}"
 
 
-def _sized(value, ends, unit):
+def _sized(value: float, ends: FloatArray, unit: str) -> str:
     """A number with its 95 % interval (2,), to two digits of its half width."""
     places = max(1 - int(np.floor(np.log10(max(0.5 * float(np.ptp(ends)), 1e-12)))), 0)
-    value, low, high = (f"{number:.{places}f}" for number in (value, *ends))
-    return f"{value} {unit} (95 %: {low} to {high})"
+    size, low, high = (f"{number:.{places}f}" for number in (value, *ends))
+    return f"{size} {unit} (95 %: {low} to {high})"
 
 
-def _confounded_with(robot, zero, least):
+def _confounded_with(robot: Robot, zero: str, least: float) -> str:
     """What a zero is confounded with, in words: errors of usual size that equal an offset of at least `least`."""
     usual = {"mm": OPTIONS.outside_error_mm, "rad": OPTIONS.outside_error_rad}
     on_platform = "the place of the target" if robot.legs.reflectors else "the place of the tool"
@@ -74,7 +81,7 @@ def _confounded_with(robot, zero, least):
     return " and ".join(dict.fromkeys(others))
 
 
-def payload_notes(inference):
+def payload_notes(inference: InferenceResult) -> Iterator[str]:
     """Sentences on significant errors of payload and tilt that the readings determine."""
     for name, unit, value, interval, determined in _significant_nuisance(inference):
         if determined:
@@ -85,7 +92,7 @@ def payload_notes(inference):
                 yield f"the base is tilted by {size} about {name[-1]}, the configuration assumes 0"
 
 
-def undetermined_payload_notes(inference):
+def undetermined_payload_notes(inference: InferenceResult) -> Iterator[str]:
     """Sentences on significant errors of payload and tilt that are confounded with a compliance."""
     for name, unit, *_, determined in _significant_nuisance(inference):
         if not determined:
@@ -94,56 +101,56 @@ def undetermined_payload_notes(inference):
             yield f"{what} and a compliance are not separately identifiable from these readings: {do}"
 
 
-def mass_notes(case):
+def mass_notes(problem: DiagnosisProblem) -> Iterator[str]:
     """The sentence that loads are not known, where an effect needs them and the links of the robot have no masses."""
-    untested = {name for name, why in case.untestable.items() if why == UNLOADED}
-    if case.massless and (untested or any(is_compliance(effect) for effect in case.effects.values())):
+    untested = {name for name, why in problem.untestable.items() if why == UNLOADED}
+    if problem.massless and (untested or any(is_compliance(effect) for effect in problem.effects.values())):
         yield MASSES_UNKNOWN
 
 
-def _significant_nuisance(inference):
+def _significant_nuisance(inference: InferenceResult) -> Iterator[tuple[str, str, float, FloatArray, bool]]:
     """Name, unit, value, 95 % interval and whether determined, of each significant error of payload and tilt.
 
     With one load all deflections are in proportion to it: the mass is then only relative to masses of the links, which
     are not measured.
     """
-    fit, case = inference.fit, inference.case
+    fit, problem = inference.fit, inference.problem
     estimate, weight = fit.estimate, fit.weight
-    if not weight or case.massless:
+    if not weight or problem.massless:
         # an error of the payload would be the weight of the links
         return
     block = estimate.parameters.places[WEIGHT]
     shares, intervals = estimate.prior_shares[block], estimate.intervals[block]
-    several_loads = len(np.unique(np.nan_to_num(case.motion.payload_kg[case.used]))) > 1
+    several_loads = len(np.unique(np.nan_to_num(problem.motion.payload_kg[problem.used]))) > 1
     for (name, unit, value, error), share, interval in zip(weight, shares, intervals, strict=True):
         if abs(value) > OPTIONS.min_nuisance_z * error:
             determined = share <= OPTIONS.max_prior_variance_share and (unit != "kg" or several_loads)
             yield name, unit, value, interval, determined
 
 
-def measured_again(case):
-    """Whether poses of a Case were measured more than once under the same conditions."""
-    return repeat_noise(case.measurements[case.used])[1] > 0
+def measured_again(problem: DiagnosisProblem) -> bool:
+    """Whether poses of a problem were measured more than once under the same conditions."""
+    return bool(repeat_noise(problem.measurements[problem.used])[1] > 0)
 
 
-def noise_notes(case, stated_mm, contradicted):
+def noise_notes(problem: DiagnosisProblem, stated_mm: float | None, contradicted: float) -> Iterator[str]:
     """Sentences on a noise that contradicts the stated one (mm per axis, None: none) by more than a factor."""
     if stated_mm == 0.0:
-        yield f"noise_mm is 0, which no instrument reaches: the noise is estimated, {case.noise_mm:.3g} mm per axis"
+        yield f"noise_mm is 0, which no instrument reaches: the noise is estimated, {problem.noise_mm:.3g} mm per axis"
     if not stated_mm:
         return
-    found = f"noise stated {stated_mm:.3g} mm per axis, found {case.noise_mm:.3g}"
-    if case.noise_mm > contradicted * stated_mm:
-        if measured_again(case):
+    found = f"noise stated {stated_mm:.3g} mm per axis, found {problem.noise_mm:.3g}"
+    if problem.noise_mm > contradicted * stated_mm:
+        if measured_again(problem):
             yield f"{found}: the robot does not repeat, or the instrument is worse"
         else:
             yield f"{found}: the instrument is worse, or the robot has errors that are not in the model"
             yield REPEATABILITY_UNKNOWN
-    elif case.noise_mm < stated_mm / contradicted:
+    elif problem.noise_mm < stated_mm / contradicted:
         yield f"{found}: the instrument is better"
 
 
-def posterior_notes(posterior):
+def posterior_notes(posterior: Posterior) -> Iterator[str]:
     """A sentence on a Posterior that depends on where its search began."""
     if posterior.apart > OPTIONS.max_searches_apart:
         yield (
@@ -152,7 +159,7 @@ def posterior_notes(posterior):
         )
 
 
-def fit_notes(inference):
+def fit_notes(inference: InferenceResult) -> Iterator[str]:
     """Sentences on a fit that did not converge."""
     end, terms = inference.fit.estimate.end, inference.fit.terms
     if not end.converged:
@@ -160,30 +167,30 @@ def fit_notes(inference):
         yield f"the fit of {names} did not converge ({end.message}): its values are preliminary"
 
 
-def bias_notes(inference):
+def bias_notes(inference: InferenceResult) -> tuple[str, ...]:
     """Sentences on the bias that each effect of the corrected model would cause if it were omitted, such as "without
     read_before_rest joint_1_x would be off by 7.1 standard errors: ..".
 
     The biased parameters are those of the least-squares fit to the omitted effect. Each bias is in units of the
     standard error that a calibration without the effect would state. Parameters of the frame do not count.
     """
-    case, linear = inference.case, inference.evidence.linear
+    problem, linear = inference.problem, inference.evidence.linear
     flat = linear.base.reshape(linear.data.size, -1)
     size = np.linalg.norm(flat, axis=0)
     inverse = np.linalg.pinv(flat / size, rcond=1e-9)
-    robot = case.mechanism
+    robot = problem.mechanism
     frame = np.abs(robot.directions[robot.legs.site_numbers[WORLD]]).any(axis=0)
     acting = {key: linear.columns[key] @ numbers for key, numbers in inference.state.effects.items()}
     unexplained = (linear.data - sum(acting.values(), np.zeros(linear.data.shape))).ravel()
     notes = []
     for (name, _), change in acting.items():
         # a discrepancy function is no effect of the library
-        if name in case.effects and case.effects[name].spoils:
+        if name in problem.effects and problem.effects[name].spoils:
             left = unexplained + change.ravel()
             left = left - flat @ (inverse @ left / size)
             noise = np.sqrt((left**2).sum() / max(len(left) - flat.shape[1], 1))
             off = np.where(frame, 0.0, np.abs(inverse @ change.ravel()) / (noise * np.linalg.norm(inverse, axis=1)))
             worst = int(off.argmax())
             wrong = f"{robot.parameters.names[worst]} would be off by {off[worst]:.2g} standard errors"
-            notes.append(f"without {name} {wrong}: {case.effects[name].spoils}")
+            notes.append(f"without {name} {wrong}: {problem.effects[name].spoils}")
     return tuple(notes)

@@ -1,5 +1,6 @@
 """The tables behind a verdict."""
 
+from collections.abc import Collection, Iterator, Sequence
 from itertools import zip_longest
 
 import numpy as np
@@ -7,16 +8,21 @@ import pandas as pd
 from scipy.special import stdtrit
 
 from rrru.campaign import measurements as rows
+from rrru.diagnosis.aliases import BoolArray, FloatArray, ObjectArray, Row
 from rrru.diagnosis.detectability import detectability
+from rrru.diagnosis.discrepancy_basis import Library
+from rrru.diagnosis.inference import InferenceResult
+from rrru.diagnosis.model_fit import ModelFit
 from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.payload_nuisance import WEIGHT
-from rrru.diagnosis.problem import GEOMETRY
-from rrru.diagnosis.shrink import shrink_table
-from rrru.diagnosis.terms import per_leg, sites, spread
+from rrru.diagnosis.problem import GEOMETRY, DiagnosisProblem
+from rrru.diagnosis.shrink import ShrinkStep, shrink_table
+from rrru.diagnosis.terms import EffectTerm, per_leg, sites, spread
 from rrru.diagnosis.variance_by_factor import drive_errors, variance_by_factor
-from rrru.diagnosis.verdict import NOT_TESTED, label
+from rrru.diagnosis.verdict import NOT_TESTED, Verdict, label
+from rrru.effects.protocol import Effect
 from rrru.estimation.intervals import QUANTILE_95
-from rrru.robots.drive_words import drive_words
+from rrru.robots.drive_words import DriveWords, drive_words
 
 # the table has columns for so many drives of either unit, whatever the robot
 _LEAST_DRIVES = 3
@@ -42,61 +48,68 @@ _STATUS = {
 }
 
 
-def details_of(inference, verdict, steps, residual_mm, generator, draws):
+def details_of(
+    inference: InferenceResult,
+    verdict: Verdict,
+    steps: Sequence[ShrinkStep],
+    residual_mm: FloatArray,
+    generator: np.random.Generator,
+    draws: int,
+) -> dict[str, pd.DataFrame]:
     """Frames by table name, without the campaign; residual_mm (n, 3): measured minus calibrated model."""
-    case, linear = inference.case, inference.case.linearise(inference.calibrated)
-    exact = case.residual(inference.state) if inference.state.effects else None
-    drive = drive_errors(case.by_point(residual_mm), case.by_point(linear.drive))
+    problem, linear = inference.problem, inference.problem.linearise(inference.calibrated)
+    exact = problem.residual(inference.state) if inference.state.effects else None
+    drive = drive_errors(problem.by_point(residual_mm), problem.by_point(linear.drive))
     return {
-        "gap_locate": variance_by_factor(case, residual_mm, linear.drive, generator, draws),
-        "gap_identifiability": detectability(case, linear),
+        "gap_locate": variance_by_factor(problem, residual_mm, linear.drive, generator, draws),
+        "gap_identifiability": detectability(problem, linear),
         "gap_attribute": _attribute_rows(inference, verdict),
         "gap_sets": _set_rows(inference),
-        "gap_shrink": shrink_table(case, steps, exact),
-        "gap_points": _point_rows(inference, steps[-1].residual_mm[case.positions], drive),
+        "gap_shrink": shrink_table(problem, steps, exact),
+        "gap_points": _point_rows(inference, steps[-1].residual_mm[problem.positions], drive),
     }
 
 
-def _attribute_rows(inference, verdict):
+def _attribute_rows(inference: InferenceResult, verdict: Verdict) -> pd.DataFrame:
     """Rows of `gap_attribute`: every effect of the library, none and unexplained, with the Verdict's decision on it."""
-    posterior, case = inference.posterior, inference.case
-    result = [_effect_row(inference, name) for name in case.effects]
+    posterior, problem = inference.posterior, inference.problem
+    result = [_effect_row(inference, name) for name in problem.effects]
     result += [
         {"effect": name, "probability": np.nan, **_EMPTY, "note": f"not tested: {note}"}
-        for name, note in case.untestable.items()
+        for name, note in problem.untestable.items()
     ]
     none, unknown = posterior.sets().get((frozenset(), False), 0.0), posterior.probability_unexplained
     result.append({"effect": "none", "probability": none, **_EMPTY})
     result.append({"effect": "unexplained", "probability": unknown, **_EMPTY})
     rows = pd.DataFrame(result)
-    decisions = [NOT_TESTED if name in case.untestable else verdict.decision(name) for name in rows["effect"]]
+    decisions = [NOT_TESTED if name in problem.untestable else verdict.decision(name) for name in rows["effect"]]
     rows.insert(2, "decision", decisions)
     groups = map(verdict.group_of, rows["effect"])
     rows.insert(3, "group_probability", [group.probability if group else np.nan for group in groups])
     return rows
 
 
-def where(inference, effects):
+def where(inference: InferenceResult, effects: Collection[str]) -> str:
     """Where the effects of a verdict act: of each its site in words, or the first and the last of several."""
-    case, found = inference.case, []
+    problem, found = inference.problem, []
     for term in inference.hypothesis.terms:
         if term.effect in effects:
-            names = sites(case.library, case.motion, term)
+            names = sites(problem.library, problem.motion, term)
             found.append(names[0] if len(names) == 1 else f"{names[0]} to {names[-1]}")
     return ", ".join(dict.fromkeys(found))
 
 
-def _effect_row(inference, name):
+def _effect_row(inference: InferenceResult, name: str) -> Row:
     """The row of one testable effect."""
     posterior = inference.posterior
-    row = {"effect": name, "probability": posterior.marginal(name), **_EMPTY}
+    row: Row = {"effect": name, "probability": posterior.marginal(name), **_EMPTY}
     holding = [h for h in posterior.hypotheses if name in h.effects]
     if not holding:
         return row | {"note": "far less probable than others"}
     best = max(holding, key=lambda h: h.evidence.max())
     row["log_evidence"] = float(best.evidence.max() - inference.evidence.on_library().none.max())
-    if per_leg(inference.case.library[name]) and (legs := posterior.legs(name)):
-        row["legs"] = str(max(legs, key=legs.get))
+    if per_leg(inference.problem.library[name]) and (legs := posterior.legs(name)):
+        row["legs"] = str(max(legs.items(), key=lambda item: item[1])[0])
     single = max((h for h in holding if len(h.terms) == 1), key=lambda h: h.evidence.max(), default=None)
     if single:
         level, held_out = int(single.evidence.argmax()), inference.held_out.on_complete(single.terms)
@@ -110,12 +123,15 @@ def _effect_row(inference, name):
     return row
 
 
-def _set_rows(inference):
+def _set_rows(inference: InferenceResult) -> pd.DataFrame:
     """Rows of `gap_sets`: the most probable sets."""
     result, none = [], inference.evidence.on_library().none.max()
     sets = list(inference.posterior.sets().items())[: OPTIONS.max_listed_sets]
     for rank, ((effects, unexplained), probability) in enumerate(sets, start=1):
-        hypothesis, _ = inference.posterior.best_of(effects, unexplained)
+        best = inference.posterior.best_of(effects, unexplained)
+        # a set of the posterior has a hypothesis
+        assert best is not None
+        hypothesis = best[0]
         row = {
             "rank": rank,
             "effects": label(tuple(sorted(effects)), unexplained),
@@ -128,10 +144,10 @@ def _set_rows(inference):
     return pd.DataFrame(result)
 
 
-def parameter_rows(inference):
+def parameter_rows(inference: InferenceResult) -> pd.DataFrame:
     """Rows of `gap_parameters`: all parameters of the corrected model with standard errors."""
-    fit, library = inference.fit, inference.case.library
-    parameters, errors = inference.case.mechanism.parameters, fit.estimate.block_errors(GEOMETRY)
+    fit, library = inference.fit, inference.problem.effects
+    parameters, errors = inference.problem.mechanism.parameters, fit.estimate.block_errors(GEOMETRY)
     intervals, places = fit.estimate.intervals, fit.estimate.parameters.places
     result = [
         ("calibration", parameter.name, "", parameter.unit, value, error, *interval, held)
@@ -144,7 +160,7 @@ def parameter_rows(inference):
             strict=True,
         )
     ]
-    words = drive_words(inference.case.mechanism)
+    words = drive_words(inference.problem.mechanism)
     for term in fit.terms:
         effect, (values, errors, ends) = library[term.effect], _effect_values(fit, library, term)
         bound = effect.parameters.at_bound(values) & (errors > 0.0)
@@ -155,7 +171,7 @@ def parameter_rows(inference):
                 effect.parameters, places_of(effect, words), values, errors, ends, bound.tolist(), strict=True
             )
         ]
-    bounds, nuisance = inference.case.bounds, intervals[places[WEIGHT]] if WEIGHT in places else ()
+    bounds, nuisance = inference.problem.bounds, intervals[places[WEIGHT]] if WEIGHT in places else ()
     result += [
         (WEIGHT, name, "", unit, value, error, *interval, value in bounds[name])
         for (name, unit, value, error), interval in zip(fit.weight, nuisance, strict=True)
@@ -164,7 +180,7 @@ def parameter_rows(inference):
     return pd.DataFrame(result, columns=("effect", "parameter", "place", "unit", *numbers))
 
 
-def places_of(effect, words):
+def places_of(effect: Effect, words: DriveWords) -> list[str]:
     """Where each parameter of an effect acts, in words, "" for one that belongs to no single leg.
 
     words: the robot's DriveWords.
@@ -181,7 +197,7 @@ def places_of(effect, words):
     return [words.place(legs[0]) if len(legs) == 1 else "" for legs in owners]
 
 
-def value_steps(fit, library, term):
+def value_steps(fit: ModelFit, library: Library, term: EffectTerm) -> Iterator[tuple[FloatArray, FloatArray, float]]:
     """Parameter values (p,) of a term's effect a step above and below what was fitted, and the size between both.
 
     One such step for each number of `ModelFit.effect_covariance`, for derivatives by these.
@@ -189,7 +205,9 @@ def value_steps(fit, library, term):
     state, key, coordinates = fit.state, (term.effect, term.shape), library[term.effect].coordinates
     shape, present, matrix = state.shape(library, key), state.effects[key], spread(coordinates, term.legs)
     names, _ = fit.effect_covariance(term)
-    shifts = [(1e-4 * column * coordinates.typical.max(), {}) for column in matrix.T]
+    shifts: list[tuple[FloatArray | float, dict[str, float]]] = [
+        (1e-4 * column * coordinates.typical.max(), {}) for column in matrix.T
+    ]
     shifts += [(0.0, {name: 1e-4 * max(abs(shape[name]), 1e-6)}) for name in names]
     for shift, moved in shifts:
         up, down = (
@@ -201,7 +219,7 @@ def value_steps(fit, library, term):
         yield up, down, 2.0 * (sum(moved.values()) if moved else np.max(shift))
 
 
-def _effect_values(fit, library, term):
+def _effect_values(fit: ModelFit, library: Library, term: EffectTerm) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Parameter values (p,) of a term's effect, standard errors (p,), 0 for what was not fitted, intervals (p, 2).
 
     The interval of a parameter that follows one fitted number is that number's, of others it is two standard errors to
@@ -227,16 +245,16 @@ def _effect_values(fit, library, term):
     return values, errors, ends
 
 
-def _point_rows(inference, after, drive):
+def _point_rows(inference: InferenceResult, after: FloatArray, drive: FloatArray) -> pd.DataFrame:
     """Rows of `gap_points`; after (n, 3), drive (n, K): residuals of the corrected model and errors of the drives."""
-    case = inference.case
-    frame = case.measurements[["run", "trajectory", "point"]].reset_index(drop=True)
-    before = case.left(inference.calibrated)[: len(frame)]
-    units = case.mechanism.parts.units
-    after, drive = (_at(case.used, values) for values in (after, drive))
+    problem = inference.problem
+    frame = problem.measurements[["run", "trajectory", "point"]].reset_index(drop=True)
+    before = problem.left(inference.calibrated)[: len(frame)]
+    units = problem.mechanism.parts.units
+    after, drive = (_at(problem.used, values) for values in (after, drive))
     unknown = np.full(len(before), np.nan)
     return frame.assign(
-        **rows.vector_columns("command", rows.command(case.measurements)),
+        **rows.vector_columns("command", rows.command(problem.measurements)),
         **rows.vector_columns("before", before),
         **rows.vector_columns("after", after),
         **{
@@ -244,37 +262,37 @@ def _point_rows(inference, after, drive):
             for unit in ("rad", "mm")
             for k, own in zip_longest(range(1, max(len(units), _LEAST_DRIVES) + 1), units)
         },
-        used=case.used,
+        used=problem.used,
     )
 
 
-def _at(used, values):
+def _at(used: BoolArray, values: FloatArray) -> FloatArray:
     """Values (m, 3) at all points from those (n, 3) of the used ones, NaN at the others."""
     result = np.full((len(used), values.shape[1]), np.nan)
     result[used] = values
     return result
 
 
-def left_out(case, use_near_singularity):
-    """Rows of `gap_left_out` without the campaign: the points that a Case does not use, counted by reason."""
-    reasons = _reasons(case, use_near_singularity)
-    counts = pd.Series(reasons[~case.used], dtype=object).value_counts()
+def left_out(problem: DiagnosisProblem, use_near_singularity: bool) -> pd.DataFrame:
+    """Rows of `gap_left_out` without the campaign: the points that a problem does not use, counted by reason."""
+    reasons = _reasons(problem, use_near_singularity)
+    counts = pd.Series(reasons[~problem.used], dtype=object).value_counts()
     found = [reason for reason in REASONS if reason in counts]
     return pd.DataFrame({"reason": found, "points": [int(counts[reason]) for reason in found]})
 
 
-def left_out_note(table, used, whole):
+def left_out_note(table: pd.DataFrame, used: int, whole: int) -> str:
     """A sentence on a table of `left_out`."""
     counts = ", ".join(f"{points} {reason}" for reason, points in table.itertuples(index=False))
     return f"{used} of {whole} points used; left out: {counts}"
 
 
-def _reasons(case, use_near_singularity):
-    """Why each point (N,) of a Case may be left out."""
-    frame, (actuators, command) = case.measurements, case.driven
+def _reasons(problem: DiagnosisProblem, use_near_singularity: bool) -> ObjectArray:
+    """Why each point (N,) of a problem may be left out."""
+    frame, (actuators, command) = problem.measurements, problem.driven
     status = frame["status"].to_numpy(dtype=object)
-    reached = np.isfinite(case.motion.position_mm).all(axis=1)
-    reached &= np.isfinite(case.mechanism.forward(actuators, guess_mm=command)).all(axis=1)
+    reached = np.isfinite(problem.motion.position_mm).all(axis=1)
+    reached &= np.isfinite(problem.mechanism.forward(actuators, guess_mm=command)).all(axis=1)
     near = (status == "near_singularity") & (not use_near_singularity)
     cases = [
         ("not measured", ~np.isfinite(rows.measured(frame)).all(axis=1)),

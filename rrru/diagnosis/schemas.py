@@ -2,7 +2,8 @@
 
 from dataclasses import replace
 
-from rrru.store.schema import Column, read_tables
+from rrru.kinematics.robot import Robot
+from rrru.store.schema import Column, Table, read_tables
 
 TABLES = read_tables("""
 campaign               str    name of the campaign in the configuration
@@ -275,7 +276,7 @@ used                   bool   false where the diagnosis left the point out
 """)
 
 
-def tables_of(robot):
+def tables_of(robot: Robot) -> tuple[Table, ...]:
     """The tables of the diagnosis, with the columns of the robot's own drives."""
     more = range(4, len(robot.parts.drives) + 1)
     text = "before, as equivalent error of drive {}; null for drives of another unit and near singularities"

@@ -1,13 +1,17 @@
 """Settings of a diagnosis: which effects may act, known values of their parameters, prior, seed."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from math import comb
+from typing import Any, Self
 
 import numpy as np
 
 from rrru.diagnosis.payload_nuisance import WEIGHT
 from rrru.effects.library import HOLDS, NAMES, find
+from rrru.effects.protocol import Effect
 from rrru.errors import ConfigError
+from rrru.kinematics.robot import Robot
 from rrru.robots.catalogue import MECHANISMS
 
 # replaces the names of the library in a configuration
@@ -25,13 +29,13 @@ class Prior:
     of the effect models.
     """
 
-    counts: tuple = (0.3, 0.55, 0.13, 0.02)
+    counts: tuple[float, ...] = (0.3, 0.55, 0.13, 0.02)
     unexplained: float = 0.1
     tolerance: float = 0.04
     each: float = 0.1
     share: float = 0.5
 
-    def log_set(self, count, library):
+    def log_set(self, count: int, library: int) -> float:
         """Logarithm of the probability of one set of so many effects of a library of so many."""
         few = self.log_count(count) - np.log(comb(library, count))
         as_they_are = count * np.log(self.each) + (library - count) * np.log1p(-self.each)
@@ -39,7 +43,7 @@ class Prior:
             log_few, log_as_they_are = np.log([1.0 - self.share, self.share])
         return float(np.logaddexp(log_few + few, log_as_they_are + as_they_are))
 
-    def log_count(self, count):
+    def log_count(self, count: int) -> float:
         """Logarithm of the probability of so many effects."""
         *_, last, most = self.counts
         listed = self.counts[min(count, len(self.counts) - 1)]
@@ -52,15 +56,15 @@ class GapSettings:
     such as a gear ratio; prior; draws: resamplings for intervals; seed; use_near_singularity: fit points marked so.
     """
 
-    effects: tuple = NAMES
-    known: dict = field(default_factory=dict)
+    effects: tuple[str, ...] = NAMES
+    known: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     prior: Prior = field(default_factory=Prior)
     draws: int = 200
     seed: int = 0
     use_near_singularity: bool = True
 
     @classmethod
-    def from_config(cls, section, seed=0, use_near_singularity=True):
+    def from_config(cls, section: dict[str, Any], seed: int = 0, use_near_singularity: bool = True) -> Self:
         """Settings of the configuration's `gap` section."""
         keys = ("prior_counts", "prior_unexplained", "tolerance", "prior_each", "prior_share")
         counts, *others = (section[key] for key in keys)
@@ -69,12 +73,12 @@ class GapSettings:
         effects = *named, *section["own_effects"]
         return cls(effects, section["known"], prior, section["draws"], seed, use_near_singularity)
 
-    def without(self, name):
+    def without(self, name: str) -> Self:
         """The settings with one effect taken out of the library, and without those that have it as a special case."""
         out = {name, *(general for general, held in HOLDS.items() if name in held)}
         return replace(self, effects=tuple(effect for effect in self.effects if effect not in out))
 
-    def library(self, robot):
+    def library(self, robot: Robot) -> dict[str, Effect]:
         """Effects by name that a robot may have, with known parameters fixed.
 
         Raises ConfigError for an unknown effect or parameter.
@@ -94,12 +98,12 @@ class GapSettings:
         alike = robot.legs.parallel
         return {name: replace(one, coordinates=replace(one.coordinates, alike=alike)) for name, one in result.items()}
 
-    def nuisance_sd(self, nuisance_sd):
+    def nuisance_sd(self, nuisance_sd: Mapping[str, float]) -> dict[str, float]:
         """Standard deviations of the errors of payload and tilt by name, zero where they are known."""
         return {name: 0.0 if name in self.known.get(WEIGHT, {}) else sd for name, sd in nuisance_sd.items()}
 
 
-def _check_weight(values):
+def _check_weight(values: Mapping[str, float]) -> None:
     """Raise ConfigError for unknown names of payload and tilt, or for values that are not zero.
 
     Tilts about all axes are allowed: robots of one configuration may stand upright or hang on a wall.
@@ -111,7 +115,7 @@ def _check_weight(values):
         raise ConfigError(f"gap.known: weight.{off[0]} is not 0; allowed: 0, as stated: state a mass with the campaign")
 
 
-def _with_known(effect, values):
+def _with_known(effect: Effect, values: Mapping[str, float]) -> Effect:
     """The effect with parameters of its shapes fixed to known values; raises ConfigError for an unknown parameter or a
     value beyond its bounds.
     """
@@ -132,7 +136,7 @@ def _with_known(effect, values):
     return replace(effect, coordinates=replace(coordinates, shapes=shapes, searched=None, doubt=shape_sd))
 
 
-def check(config):
+def check(config: Mapping[str, Any]) -> None:
     """Raise ConfigError where the `gap` section names an effect or a parameter that does not exist."""
     for kind in MECHANISMS.values():
         GapSettings.from_config(config["gap"]).library(kind())

@@ -1,12 +1,18 @@
 """How far the gap shrinks as effects are added: on points left out of the fit, and on the re-simulated campaign."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 import pandas as pd
 
+from rrru.diagnosis.aliases import BoolArray, FloatArray, IntArray, Row
 from rrru.diagnosis.heldout import resampled_rows
+from rrru.diagnosis.inference import InferenceResult
 from rrru.diagnosis.options import OPTIONS
+from rrru.diagnosis.problem import DiagnosisProblem
+from rrru.diagnosis.terms import EffectTerm
 
 CLOSED = ("share_closed", "share_closed_low", "share_closed_high")
 
@@ -20,44 +26,45 @@ class ShrinkStep:
     """
 
     added: str
-    effects: tuple
-    residual_mm: np.ndarray
-    squares_mm2: np.ndarray
-    picks: np.ndarray
-    shown_mm2: np.ndarray
-    moved_mm2: np.ndarray
-    counted: np.ndarray
+    effects: tuple[str, ...]
+    residual_mm: FloatArray
+    squares_mm2: FloatArray
+    picks: IntArray
+    shown_mm2: FloatArray
+    moved_mm2: FloatArray
+    counted: BoolArray
 
-    def part(self, chosen):
+    def part(self, chosen: BoolArray) -> Self:
         """The step at those of the chosen readings (m,) that count."""
         return replace(self, counted=self.counted & chosen)
 
     @property
-    def gap_rms_mm(self):
+    def gap_rms_mm(self) -> float:
         """Root mean square gap."""
         return gap_rms(self.squares_mm2[self.counted])
 
     @property
-    def drawn_rms_mm(self):
+    def drawn_rms_mm(self) -> FloatArray:
         """Root mean square gap (b,) of the draws, NaN of those that have no reading that counts."""
         picked = self.counted[self.picks]
         with np.errstate(invalid="ignore"):
             shown = np.where(picked, self.shown_mm2[self.picks], 0.0).sum(axis=1) / picked.sum(axis=1)
-        return np.sqrt(np.maximum(shown + self.moved_mm2[:, self.counted].mean(axis=1), 0.0))
+        return np.asarray(np.sqrt(np.maximum(shown + self.moved_mm2[:, self.counted].mean(axis=1), 0.0)))
 
 
-def gap_rms(squares):
+def gap_rms(squares: FloatArray) -> float:
     """Root mean square gap from squared gaps whose noise is taken off; zero where noise explains all."""
     return float(np.sqrt(max(float(np.mean(squares)), 0.0)))
 
 
-def order_by_share(inference):
+def order_by_share(inference: InferenceResult) -> tuple[tuple[EffectTerm, float], ...]:
     """(term, share of the gap's mean square on left-out points that it removes when it comes next), largest first."""
     hypothesis, level = inference.hypothesis, inference.level
-    left, chosen, result = list(hypothesis.terms), [], []
-    noise, counted = 3.0 * inference.case.noise_mm**2, inference.case.on_robot
+    left, result = list(hypothesis.terms), []
+    chosen: list[EffectTerm] = []
+    noise, counted = 3.0 * inference.problem.noise_mm**2, inference.problem.on_robot
 
-    def gap(terms):
+    def gap(terms: Sequence[EffectTerm]) -> float:
         prediction = inference.held_out.predict(terms, hypothesis.strengths_of(terms, level), level, uncertain=False)
         return max(float((prediction.residual_mm[counted] ** 2).sum(axis=1).mean()) - noise, 0.0)
 
@@ -71,7 +78,9 @@ def order_by_share(inference):
     return tuple(result)
 
 
-def shrink_steps(inference, ordered, generator, draws):
+def shrink_steps(
+    inference: InferenceResult, ordered: Sequence[EffectTerm], generator: np.random.Generator, draws: int
+) -> tuple[ShrinkStep, ...]:
     """Steps from the calibration alone to all effects, one after another.
 
     ordered: terms in the order in which they are added. What the last step leaves is the uncertainty of its numbers
@@ -79,24 +88,33 @@ def shrink_steps(inference, ordered, generator, draws):
     probability that something is unexplained. The draws resample runs (stretches where there are fewer than ten) and
     redraw the fitted numbers.
     """
-    case, hypothesis, level = inference.case, inference.hypothesis, inference.level
-    picks, result = resampled_rows(case, generator, draws), []
+    problem, hypothesis, level = inference.problem, inference.hypothesis, inference.level
+    picks, result = resampled_rows(problem, generator, draws), []
     for count in range(len(ordered) + 1):
         terms = ordered[:count]
         last = count == len(ordered)
         prediction = inference.held_out.predict(terms, hypothesis.strengths_of(terms, level), level, uncertain=last)
-        shown = (prediction.residual_mm**2).sum(axis=1) - 3.0 * case.noise_mm**2
+        shown = (prediction.residual_mm**2).sum(axis=1) - 3.0 * problem.noise_mm**2
         weight = inference.posterior.probability_unexplained if last else 1.0
         numbers = generator.standard_normal((draws, prediction.spread.shape[-1]))
         moved = ((prediction.spread @ numbers.T) ** 2).sum(axis=1).T
         squares = weight * shown + (1.0 - weight) * prediction.uncertainty_mm2
-        drawn = picks, weight * shown, (1.0 - weight) * moved
-        names = terms[-1].effect if terms else "", tuple(term.effect for term in terms)
-        result.append(ShrinkStep(*names, prediction.residual_mm, squares, *drawn, case.on_robot))
+        result.append(
+            ShrinkStep(
+                added=terms[-1].effect if terms else "",
+                effects=tuple(term.effect for term in terms),
+                residual_mm=prediction.residual_mm,
+                squares_mm2=squares,
+                picks=picks,
+                shown_mm2=weight * shown,
+                moved_mm2=(1.0 - weight) * moved,
+                counted=problem.on_robot,
+            )
+        )
     return tuple(result)
 
 
-def share_closed(before, after):
+def share_closed(before: ShrinkStep, after: ShrinkStep) -> tuple[float, float, float]:
     """Explained fraction between two steps and its 95 % interval from their draws; zero where there was no gap."""
     share = _share(before.gap_rms_mm, after.gap_rms_mm)
     drawn = zip(before.drawn_rms_mm, after.drawn_rms_mm, strict=True)
@@ -105,23 +123,25 @@ def share_closed(before, after):
     return share, float(np.minimum(low, share)), float(np.maximum(high, share))
 
 
-def shrink_table(case, steps, resimulated_mm):
+def shrink_table(
+    problem: DiagnosisProblem, steps: Sequence[ShrinkStep], resimulated_mm: FloatArray | None
+) -> pd.DataFrame:
     """Rows of `gap_shrink` without the campaign.
 
     resimulated_mm (m, 3): residuals of the corrected model, None without effects.
     """
-    trajectory = case.points["trajectory"].to_numpy()
-    noise = float(np.sqrt(3.0) * case.noise_mm)
+    trajectory = problem.points["trajectory"].to_numpy()
+    noise = float(np.sqrt(3.0) * problem.noise_mm)
     rows = []
     for number, step in enumerate(steps):
-        for name in ("*", *pd.unique(trajectory[case.on_robot])):
+        for name in ("*", *pd.unique(trajectory[problem.on_robot])):
             chosen = np.full(len(trajectory), True) if name == "*" else trajectory == name
             part = step.part(chosen)
             share = share_closed(steps[0].part(chosen), part) if number else (np.nan,) * 3
             sizes = _sizes(part.residual_mm[part.counted]) | {"noise_rms_mm": noise, "gap_rms_mm": part.gap_rms_mm}
             rows.append(_label(number, step, name, "held_out") | sizes | dict(zip(CLOSED, share, strict=True)))
     if resimulated_mm is not None:
-        resimulated_mm = resimulated_mm[case.on_robot]
+        resimulated_mm = resimulated_mm[problem.on_robot]
         after = gap_rms((resimulated_mm**2).sum(axis=1) - noise**2)
         sizes = _sizes(resimulated_mm) | {"noise_rms_mm": noise, "gap_rms_mm": after}
         share = _share(steps[0].gap_rms_mm, after), np.nan, np.nan
@@ -130,7 +150,7 @@ def shrink_table(case, steps, resimulated_mm):
     return pd.DataFrame(rows)
 
 
-def model_row(shrink, kind, left_mm, noise_mm):
+def model_row(shrink: pd.DataFrame, kind: str, left_mm: FloatArray, noise_mm: float) -> Row:
     """A row of `gap_shrink` of a robot's file, given_model or corrected_model, in addition to the other rows.
 
     left_mm (m, 3): measured minus the file's robot, NaN where it was not driven; noise_mm: per axis.
@@ -147,19 +167,19 @@ def model_row(shrink, kind, left_mm, noise_mm):
     return label | sizes | dict(zip(CLOSED, share, strict=True))
 
 
-def _label(number, step, trajectory, kind):
+def _label(number: int, step: ShrinkStep, trajectory: str, kind: str) -> Row:
     """What a row of `gap_shrink` is about."""
     effects = "+".join(step.effects) or "none"
     return {"step": number, "added": step.added, "effects": effects, "trajectory": trajectory, "kind": kind}
 
 
-def _sizes(residual_mm):
+def _sizes(residual_mm: FloatArray) -> Row:
     """Points and sizes of residuals (n, 3)."""
     distance = np.linalg.norm(residual_mm, axis=1)
     rms = float(np.sqrt((distance**2).mean()))
     return {"points": len(distance), "rms_mm": rms, "max_mm": float(distance.max())}
 
 
-def _share(before, after):
+def _share(before: float, after: float) -> float:
     """Reduction of the mean square from one rms to another, not below -1; zero where there was no gap."""
     return max(1.0 - (after / before) ** 2, -1.0) if before > 0.0 else 0.0

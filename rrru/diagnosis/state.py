@@ -1,35 +1,40 @@
-"""A corrected model, and the model linearised about it. Lengths in mm, angles in rad."""
+"""A point of the corrected model, and the model linearised about it. Lengths in mm, angles in rad."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from typing import Self
 
 import numpy as np
 
+from rrru.diagnosis.aliases import BoolArray, EffectKey, FloatArray, WeightStep
+from rrru.diagnosis.discrepancy_basis import Library
 from rrru.diagnosis.payload_nuisance import WEIGHT
-from rrru.effects.protocol import Contribution, is_compliant, lacks_values
+from rrru.effects.protocol import Contribution, Motion, is_compliant, lacks_values
 
 
 @dataclass(frozen=True)
-class State:
-    """A corrected model: deviations (p,) of the mechanism and, by effect and number of its shape, coordinates (c,).
+class ModelState:
+    """A point of the corrected model: geometric errors and coefficients of the effects.
 
+    deviations (p,): of the mechanism; effects: (effect, number of its shape) to its coordinates (c,);
     shape_values: effect to the values of its shape's parameters where they have been fitted; "weight" to the errors of
     payload and tilt.
     """
 
-    deviations: np.ndarray
-    effects: dict
-    shape_values: dict = field(default_factory=dict)
+    deviations: FloatArray
+    effects: Mapping[EffectKey, FloatArray]
+    shape_values: dict[str, dict[str, float]] = field(default_factory=dict)
 
     @property
-    def weight(self):
+    def weight(self) -> dict[str, float]:
         """Errors of payload and tilt by name, empty where not fitted, see `rrru.diagnosis.payload_nuisance`."""
         return self.shape_values.get(WEIGHT, {})
 
-    def under(self, weight):
+    def under(self, weight: dict[str, float]) -> Self:
         """The state with other errors of payload and tilt."""
         return replace(self, shape_values=self.shape_values | {WEIGHT: weight})
 
-    def shape(self, library, key):
+    def shape(self, library: Library, key: EffectKey) -> Mapping[str, float]:
         """Values of the shape's parameters of one effect (name, shape) by name."""
         name, number = key
         if key in self.effects and name in self.shape_values:
@@ -37,7 +42,14 @@ class State:
             return self.shape_values[name]
         return library[name].coordinates.shapes[number]
 
-    def contribution(self, library, key, motion, coordinates=None, shape=None):
+    def contribution(
+        self,
+        library: Library,
+        key: EffectKey,
+        motion: Motion,
+        coordinates: FloatArray | None = None,
+        shape: Mapping[str, float] | None = None,
+    ) -> Contribution:
         """What one effect (name, shape) changes along a motion, at its own coordinates and shape or other ones."""
         coordinates = self.effects[key] if coordinates is None else coordinates
         effect = library[key[0]]
@@ -64,19 +76,24 @@ class LinearizedProblem:
     priors, the means as steps from the present values, None for flat priors.
     """
 
-    data: np.ndarray
-    base: np.ndarray
-    columns: dict
-    shape_columns: dict
-    shape_steps: dict
-    drive: np.ndarray
-    by_weight: dict = field(default_factory=dict)
-    weight_steps: tuple = ()
-    base_prior: tuple | None = None
+    data: FloatArray
+    base: FloatArray
+    columns: dict[EffectKey, FloatArray]
+    shape_columns: dict[str, FloatArray]
+    shape_steps: dict[str, tuple[tuple[str, float, float], ...]]
+    drive: FloatArray
+    by_weight: dict[EffectKey, FloatArray] = field(default_factory=dict)
+    weight_steps: tuple[WeightStep, ...] = ()
+    base_prior: tuple[FloatArray, FloatArray] | None = None
 
-    def at(self, rows):
+    def at(self, rows: BoolArray) -> Self:
         """The linearisation at some of its rows (m,)."""
-        arrays = {name: getattr(self, name)[rows] for name in ("data", "base", "drive")}
-        columns = {name: getattr(self, name) for name in ("columns", "shape_columns", "by_weight")}
-        chosen = {name: {key: values[rows] for key, values in made.items()} for name, made in columns.items()}
-        return replace(self, **arrays, **chosen)
+        return replace(
+            self,
+            data=self.data[rows],
+            base=self.base[rows],
+            drive=self.drive[rows],
+            columns={key: values[rows] for key, values in self.columns.items()},
+            shape_columns={name: values[rows] for name, values in self.shape_columns.items()},
+            by_weight={key: values[rows] for key, values in self.by_weight.items()},
+        )

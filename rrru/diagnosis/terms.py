@@ -1,8 +1,14 @@
 """The hypotheses of the diagnosis: sets of terms, a term being one effect in one shape on certain legs."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+
+from rrru.diagnosis.aliases import FloatArray
+from rrru.diagnosis.discrepancy_basis import Library, TestedEffect
+from rrru.diagnosis.state import LinearizedProblem
+from rrru.effects.protocol import Coordinates, Motion
 
 # on which legs an effect acts: on each with its own value, on all with one value, or on one leg alone
 EACH, SAME = "each", "same"
@@ -17,34 +23,42 @@ class EffectTerm:
     legs: str | int = EACH
 
 
-def spread(coordinates, legs):
+def spread(coordinates: Coordinates, legs: str | int) -> FloatArray:
     """Matrix (c, k) from the k free numbers of a term to the effect's coordinates."""
     every = np.eye(len(coordinates))
     if legs == EACH:
         return every
     if legs == SAME:
         # coordinates of one kind come in the order of the legs
-        return np.stack([every[:, coordinates.legs == leg] for leg in np.unique(coordinates.legs)]).sum(axis=0)
+        return np.asarray(
+            np.stack([every[:, coordinates.legs == leg] for leg in np.unique(coordinates.legs)]).sum(axis=0)
+        )
     return every[:, coordinates.legs == legs]
 
 
-def each_leg(term):
+def shape_probabilities(coordinates: Coordinates) -> FloatArray:
+    """Prior probabilities (shapes,) of the shapes of an effect."""
+    count = len(coordinates.shapes)
+    return np.asarray(coordinates.weights or np.full(count, 1.0 / count))
+
+
+def each_leg(term: EffectTerm) -> EffectTerm:
     """The term with a value of its own for each leg where it has one value for all of them."""
     return replace(term, legs=EACH) if term.legs == SAME else term
 
 
-def per_leg(effect):
+def per_leg(effect: TestedEffect) -> bool:
     """Whether every coordinate of an effect belongs to one leg."""
     return bool((effect.coordinates.legs > 0).all())
 
 
-def legs_alike(effect):
+def legs_alike(effect: TestedEffect) -> bool:
     """Whether an effect has the same number of coordinates on each leg, so that legs may share values."""
     legs = effect.coordinates.legs
     return per_leg(effect) and len(np.unique(np.unique(legs, return_counts=True)[1])) == 1
 
 
-def variants(effect):
+def variants(effect: TestedEffect) -> tuple[EffectTerm, ...]:
     """All terms of an effect: each shape with each choice of legs that makes a difference.
 
     One value for all legs is tried for coordinates that cannot be negative: sizes of one design, unlike the signed
@@ -59,13 +73,13 @@ def variants(effect):
     return tuple(EffectTerm(effect.name, shape, legs) for shape in range(len(coordinates.shapes)) for legs in choices)
 
 
-def signatures(library, linear, terms):
+def signatures(library: Library, linear: LinearizedProblem, terms: Sequence[EffectTerm]) -> list[FloatArray]:
     """Columns (n, 3, k) of each term's free numbers on a linearisation."""
     pairs = ((linear.columns[term.effect, term.shape], term) for term in terms)
     return [c if t.legs == EACH else c @ spread(library[t.effect].coordinates, t.legs) for c, t in pairs]
 
 
-def sites(library, motion, term):
+def sites(library: Library, motion: Motion, term: EffectTerm) -> list[str]:
     """Names of the robot's sites at which a term acts along a motion."""
     effect = library[term.effect]
     sizes = effect.coordinates.typical * spread(effect.coordinates, term.legs).sum(axis=1)

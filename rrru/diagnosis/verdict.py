@@ -12,16 +12,21 @@ group wherever a model is needed.
 No cause is named where the best answer does not describe its readings at all. Lengths in mm, angles in rad.
 """
 
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from rrru.campaign.noise import repeat_noise
+from rrru.diagnosis.aliases import CauseSet
+from rrru.diagnosis.inference import InferenceResult
 from rrru.diagnosis.options import OPTIONS
+from rrru.diagnosis.posterior import Posterior
 from rrru.diagnosis.problem import GEOMETRY
 from rrru.diagnosis.terms import per_leg
+from rrru.effects.protocol import Effect
 
-_NONE = (frozenset(), False)
+_NONE: CauseSet = (frozenset(), False)
 # decisions on a cause, as the tables have them
 NAMED, GROUPED, POSSIBLE, EXCLUDED, NOT_TESTED = "named", "group", "possible", "excluded", "not tested"
 
@@ -30,7 +35,7 @@ NAMED, GROUPED, POSSIBLE, EXCLUDED, NOT_TESTED = "named", "group", "possible", "
 class Group:
     """Confounded causes, of which one acts, the most probable first, and the probability that one of them acts."""
 
-    names: tuple
+    names: tuple[str, ...]
     probability: float
 
 
@@ -43,32 +48,32 @@ class Verdict:
     why the fit allows none, else empty; sure: probability of the least sure of the decisions on single causes.
     """
 
-    effects: tuple
+    effects: tuple[str, ...]
     unexplained: bool
     probability: float
     leg: int
-    possible: tuple
-    rivals: tuple
-    groups: tuple = ()
+    possible: tuple[str, ...]
+    rivals: tuple[tuple[frozenset[str], bool, float], ...]
+    groups: tuple[Group, ...] = ()
     no_answer: str = ""
     sure: float = 0.0
 
     @property
-    def label(self):
+    def label(self) -> str:
         """The answer as the table gives it."""
         return label(self.effects, self.unexplained)
 
     @property
-    def confounded_with(self):
+    def confounded_with(self) -> tuple[str, ...]:
         """Causes that may act and are not in the answer: the others of its groups, and those that are possible."""
         grouped = [name for group in self.groups for name in group.names[1:]]
         return tuple(name for name in dict.fromkeys([*grouped, *self.possible]) if name not in self.effects)
 
-    def group_of(self, name):
+    def group_of(self, name: str) -> Group | None:
         """The Group that a cause belongs to, None for none."""
         return next((group for group in self.groups if name in group.names), None)
 
-    def decision(self, name):
+    def decision(self, name: str) -> str:
         """The decision on a tested cause: NAMED, GROUPED, POSSIBLE or EXCLUDED.
 
         Causes of the most probable answer where none is probable enough for a name are POSSIBLE.
@@ -81,17 +86,17 @@ class Verdict:
         return NAMED if chosen else EXCLUDED
 
 
-def without_answer(why):
+def without_answer(why: str) -> Verdict:
     """The Verdict on a fit that describes its readings too badly for any answer, see `why_no_answer`."""
     return Verdict((), True, 1.0, 0, (), (), (), why)
 
 
-def label(effects, unexplained):
+def label(effects: Iterable[str], unexplained: bool) -> str:
     """Names joined by +, with "unexplained" last; "none" for nothing."""
     return "+".join((*effects, *(("unexplained",) if unexplained else ()))) or "none"
 
 
-def decide(posterior, library, small=frozenset()):
+def decide(posterior: Posterior, library: Mapping[str, Effect], small: Collection[str] = frozenset()) -> Verdict:
     """Verdict of a Posterior; library: the effects that may be named, by name; small: those that are not, see below.
 
     Nothing is named as long as "none" has a probability of 0.2: a false alarm costs more than a gap too small to
@@ -103,10 +108,10 @@ def decide(posterior, library, small=frozenset()):
     none = sets.get(_NONE, 0.0)
     marginal = {name: posterior.marginal(name) for name in library}
     order = sorted(marginal, key=lambda name: (-marginal[name], name))
-    groups = ()
-    if none > OPTIONS.max_none_probability:
-        effects, unexplained = (), False
-    else:
+    groups: tuple[Group, ...] = ()
+    effects: tuple[str, ...] = ()
+    unexplained = False
+    if none <= OPTIONS.max_none_probability:
         unexplained = unknown > OPTIONS.min_unexplained_probability
         order = [name for name in order if not (unexplained and name in small)]
         effects = tuple(name for name in order if marginal[name] >= OPTIONS.min_named_probability)
@@ -114,8 +119,7 @@ def decide(posterior, library, small=frozenset()):
         effects += tuple(group.names[0] for group in groups)
         if not (effects or unexplained):
             # something acts, and no cause is probable enough: the most probable answer that has one
-            answers = {key: p for key, p in sets.items() if key != _NONE}
-            best = max(answers, key=answers.get)
+            best = max((key for key in sets if key != _NONE), key=lambda key: sets[key])
             effects, unexplained = tuple(sorted(best[0])), best[1]
     named = {name for name in effects if marginal[name] >= OPTIONS.min_named_probability}
     chosen = frozenset(effects), unexplained
@@ -147,7 +151,7 @@ def decide(posterior, library, small=frozenset()):
     )
 
 
-def _groups(posterior, names, marginal):
+def _groups(posterior: Posterior, names: Iterable[str], marginal: Mapping[str, float]) -> tuple[Group, ...]:
     """Groups among names that are not named, the most probable first: those that exclude each other.
 
     marginal: probability of each name.
@@ -171,20 +175,20 @@ def _groups(posterior, names, marginal):
     return tuple(found)
 
 
-def _exclude(posterior, marginal, first, second):
+def _exclude(posterior: Posterior, marginal: Mapping[str, float], first: str, second: str) -> bool:
     """Whether two causes act together much less often than if they were independent."""
     return posterior.both(first, second) < OPTIONS.max_joint_probability_ratio * marginal[first] * marginal[second]
 
 
-def _leg(posterior, effects, library):
+def _leg(posterior: Posterior, effects: Iterable[str], library: Mapping[str, Effect]) -> int:
     """The one leg that all effects with legs of their own name, 0 where there is none."""
     likely = [posterior.legs(name) for name in effects if per_leg(library[name])]
-    best = {max(legs, key=legs.get) for legs in likely if legs}
+    best = {max(legs.items(), key=lambda item: item[1])[0] for legs in likely if legs}
     leg = best.pop() if len(best) == 1 else 0
     return leg if isinstance(leg, int) else 0
 
 
-def why_no_answer(inference, stated_mm=None):
+def why_no_answer(inference: InferenceResult, stated_mm: float | None = None) -> str:
     """Why no cause can be named, in words; empty where the fit of the best answer may be read.
 
     A fit whose geometric errors end at their bounds has its minimum outside of all plausible robots. A fit with
@@ -194,9 +198,9 @@ def why_no_answer(inference, stated_mm=None):
     return "; ".join(filter(None, (_at_bounds(inference), _far_off(inference, stated_mm))))
 
 
-def _at_bounds(inference):
+def _at_bounds(inference: InferenceResult) -> str:
     """Which geometric errors end at bounds, in words; empty where none."""
-    estimate, parameters = inference.fit.estimate, inference.case.mechanism.parameters
+    estimate, parameters = inference.fit.estimate, inference.problem.mechanism.parameters
     held = np.flatnonzero(estimate.at_bound[estimate.parameters.places[GEOMETRY]])
     if not len(held):
         return ""
@@ -208,12 +212,12 @@ def _at_bounds(inference):
     return f"the fit ends at bounds of calibration parameters ({', '.join(shown)}{more})"
 
 
-def _far_off(inference, stated_mm):
+def _far_off(inference: InferenceResult, stated_mm: float | None) -> str:
     """How far the best answer is from the readings, in words; empty where that is less than many times the noise."""
-    case = inference.case
-    left = float(np.sqrt((case.residual(inference.state) ** 2).sum(axis=1).mean()))
-    repeated, count = repeat_noise(case.measurements[case.used])
-    axis_mm = max(stated_mm or case.noise_mm, repeated if count else 0.0)
+    problem = inference.problem
+    left = float(np.sqrt((problem.residual(inference.state) ** 2).sum(axis=1).mean()))
+    repeated, count = repeat_noise(problem.measurements[problem.used])
+    axis_mm = max(stated_mm or problem.noise_mm, repeated if count else 0.0)
     noise = float(np.sqrt(3.0) * axis_mm)
     if left <= OPTIONS.max_left_per_noise * noise:
         return ""

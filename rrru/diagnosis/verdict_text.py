@@ -3,8 +3,13 @@
 `rrru/pipeline/verdict.schema.yaml` is its schema. mm, rad; sizes are root mean squares of 3-D distances.
 """
 
-import numpy as np
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
+import numpy as np
+import pandas as pd
+
+from rrru.diagnosis.aliases import Facts
 from rrru.diagnosis.design.run_limits import NO_PAYLOAD, WITHIN_LIMITS
 from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.result_notes import MASSES_UNKNOWN, REPEATABILITY_UNKNOWN
@@ -39,7 +44,9 @@ _NO_SIZE = "Its size is not determined, because no masses of the links are state
 _RANDOM = "random error above the stated noise. Repeatability is unknown: no pose was measured twice."
 
 
-def answer(campaign, verdict, tables, drives=_WORDS):
+def answer(
+    campaign: str, verdict: Facts, tables: Mapping[str, pd.DataFrame], drives: DriveWords = _WORDS
+) -> dict[str, Any]:
     """The facts of one campaign as a mapping, which `rrru.store.json_files` writes.
 
     verdict: the row of `gap_verdicts` as a mapping; tables: the frames of the other tables of the diagnosis by name;
@@ -75,7 +82,7 @@ def answer(campaign, verdict, tables, drives=_WORDS):
     return facts | {"sentences": sentences(facts)}
 
 
-def _corrected_file(verdict):
+def _corrected_file(verdict: Facts) -> dict[str, Any] | None:
     """Residual errors of the robot's corrected file; None where the robot has no file."""
     known = np.isfinite(verdict["file_error_mm"])
     if not (known or verdict["not_in_model"]):
@@ -89,7 +96,7 @@ def _corrected_file(verdict):
     }
 
 
-def expected_mm(verdict):
+def expected_mm(verdict: Facts) -> float:
     """Error in mm to expect of a corrected file's robot at poses and loads like those measured.
 
     Its distance from the diagnosed robot and the error of that one at held-out points are independent: squares add.
@@ -99,7 +106,7 @@ def expected_mm(verdict):
     return float(np.hypot(np.fmax(*distances), verdict["gap_after_rms_mm"]))
 
 
-def sentences(facts):
+def sentences(facts: Facts) -> list[str]:
     """What the facts say, the headline first, for readers who know the robot and no statistics."""
     if facts["no_answer"]:
         return [_no_answer(facts), _CHECK]
@@ -110,12 +117,12 @@ def sentences(facts):
     return [*said, *_open(facts), *_next(facts)]
 
 
-def readable(name):
+def readable(name: str) -> str:
     """The name of an effect, or of several joined by +, as words."""
     return name.replace("_", " ").replace("+", " + ")
 
 
-def rounded(value, digits=2):
+def rounded(value: float | None, digits: int = 2) -> str:
     """A number to some significant digits, without an exponent; "unknown" for None and what is not finite."""
     if value is None or not np.isfinite(value):
         return "unknown"
@@ -125,7 +132,7 @@ def rounded(value, digits=2):
     return f"{round(value, places):.{max(places, 0)}f}"
 
 
-def with_interval(value, low, high, unit=""):
+def with_interval(value: float, low: float, high: float, unit: str = "") -> str:
     """A number with its 95 % interval, all to two digits of the interval's half width.
 
     >>> with_interval(0.12014, 0.11902, 0.12126, "mm")
@@ -133,49 +140,51 @@ def with_interval(value, low, high, unit=""):
     """
     places = 1 - int(np.floor(np.log10(0.5 * (high - low))))
     # a rounded number below zero that is zero has no sign
-    value, low, high = (f"{round(one, places) + 0.0:.{max(places, 0)}f}" for one in (value, low, high))
-    return f"{value}{' ' if unit else ''}{unit} (95 %: {low} to {high})"
+    size, least, most = (f"{round(one, places) + 0.0:.{max(places, 0)}f}" for one in (value, low, high))
+    return f"{size}{' ' if unit else ''}{unit} (95 %: {least} to {most})"
 
 
-def probability(value):
+def probability(value: float) -> str:
     """A probability to two digits that claims no certainty."""
     return "more than 0.99" if value > 0.995 else "less than 0.01" if value < 0.005 else f"{value:.2f}"
 
 
-def percent(share):
+def percent(share: float) -> str:
     """A share in per cent, limited to 0 to 100: shares of confounded effects may be beyond."""
     return f"{100.0 * min(max(share, 0.0), 1.0):.0f} %"
 
 
-def small_percent(share):
+def small_percent(share: float) -> str:
     """A share in per cent that is not rounded to nothing."""
     return "less than 1 %" if 0.0 < share < 0.005 else percent(share)
 
 
-def share_with_interval(part, follow=""):
+def share_with_interval(part: Facts, follow: str = "") -> str:
     """The share of a part of the budget, or of an effect, with its 95 % interval; no number where that says nothing."""
     if not is_determined(part):
         return f"an undetermined share{follow}"
     return f"{percent(part['share'])}{follow} (95 %: {percent(part['share_low'])} to {percent(part['share_high'])})"
 
 
-def is_determined(part):
+def is_determined(part: Facts) -> bool:
     """Whether the 95 % interval of a share covers so little of 0 to 1 that the share says something."""
     low, high = (min(max(part[end], 0.0), 1.0) for end in ("share_low", "share_high"))
     return not high - low >= OPTIONS.max_share_interval
 
 
-def _row(values, names):
+def _row(values: Facts, names: Iterable[str]) -> dict[str, Any]:
     """Some entries of a mapping."""
     return {name: values[name] for name in names}
 
 
-def _clipped(value):
+def _clipped(value: float) -> float:
     """A probability that is a sum without what rounding adds to 1; NaN stays."""
     return value if np.isnan(value) else min(value, 1.0)
 
 
-def _effect(name, tables, budget, drives):
+def _effect(
+    name: str, tables: Mapping[str, pd.DataFrame], budget: Sequence[Facts], drives: DriveWords
+) -> dict[str, Any]:
     """Facts of one effect of the verdict."""
     share = next((part for part in budget if part["part"] == name and part["kind"] == "effect"), {})
     cause = tables["gap_attribute"].set_index("effect").loc[name]
@@ -196,13 +205,13 @@ def _effect(name, tables, budget, drives):
     }
 
 
-def _places(numbers):
+def _places(numbers: Sequence[Facts]) -> str:
     """Where an effect acts whose parameters, rows of `gap_parameters`, each belong to one of several legs or drives."""
     places = [place.partition(" ") for place in dict.fromkeys(number["place"] for number in numbers) if place]
     return f"{places[0][0]} {', '.join(name for _, _, name in places)}" if places else ""
 
 
-def _group(names, tables, budget):
+def _group(names: list[str], tables: Mapping[str, pd.DataFrame], budget: Sequence[Facts]) -> dict[str, Any]:
     """Facts of a group of confounded causes."""
     causes = tables["gap_attribute"].set_index("effect").loc[names]
     shares = {part["part"]: part["share"] for part in budget if part["kind"] == "effect"}
@@ -215,18 +224,18 @@ def _group(names, tables, budget):
     }
 
 
-def _not_tested(causes):
+def _not_tested(causes: pd.DataFrame) -> list[dict[str, str]]:
     """Effects that have no probability, with the reason, from rows of `gap_attribute`."""
     rows = causes[causes["decision"] == NOT_TESTED].to_dict("records")
     return [{"name": row["effect"], "reason": row["note"].removeprefix(f"{NOT_TESTED}: ")} for row in rows]
 
 
-def _no_answer(facts):
+def _no_answer(facts: Facts) -> str:
     """Why nothing is said of causes."""
     return f"No cause is named: {facts['no_answer']}."
 
 
-def _missed(facts):
+def _missed(facts: Facts) -> str:
     """Residual error of the calibrated robot at points that its calibration has not used."""
     gap, noise = (rounded(facts[name]) for name in ("gap_rms_mm", "noise_rms_mm"))
     if facts["effects"] or facts["unexplained"]:
@@ -238,7 +247,7 @@ def _missed(facts):
     )
 
 
-def _causes(facts):
+def _causes(facts: Facts) -> list[str]:
     """The causes of the gap with their shares and probabilities."""
     with_shares = _shares_are_determined(facts)
     groups = {group["names"][0]: group for group in facts["groups"]}
@@ -273,7 +282,7 @@ def _causes(facts):
     return [*said, *_sure(facts, groups)] if said else []
 
 
-def _looks_like(rows):
+def _looks_like(rows: Sequence[Facts]) -> list[str]:
     """What the unexplained part follows, from rows of `gap_remainder`, the best first."""
     if not rows:
         return []
@@ -295,13 +304,13 @@ def _looks_like(rows):
     ]
 
 
-def _is_small(effect, facts):
+def _is_small(effect: Facts, facts: Facts) -> bool:
     """Whether an effect's part of the gap is too small for a sentence."""
     small = (effect["rms_mm"] or 0.0) < OPTIONS.min_cause_per_noise * facts["noise_rms_mm"]
     return effect["share"] is not None and (small or effect["share"] < OPTIONS.min_cause_share)
 
 
-def _by_share(facts, groups, small):
+def _by_share(facts: Facts, groups: Mapping[str, Facts], small: int) -> str:
     """All causes in a line, each with its share, the small ones of so many counted."""
     listed = []
     for effect in facts["effects"]:
@@ -319,7 +328,7 @@ def _by_share(facts, groups, small):
     return f"Causes by their share of the gap: {', '.join(words)}."
 
 
-def _of_group(group, with_shares):
+def _of_group(group: Facts, with_shares: bool) -> str:
     """Confounded causes of which one acts."""
     names = [readable(name) for name in group["names"]]
     listed = ", ".join(f"{name} {probability(p)}" for name, p in zip(names, group["probabilities"], strict=True))
@@ -330,7 +339,7 @@ def _of_group(group, with_shares):
     )
 
 
-def _sure(facts, groups):
+def _sure(facts: Facts, groups: Mapping[str, Facts]) -> list[str]:
     """How probable each cause is, and the answer as a whole."""
     single = [effect for effect in facts["effects"] if effect["name"] not in groups]
     exactly = probability(facts["probability"])
@@ -340,14 +349,14 @@ def _sure(facts, groups):
     return [f"Probability that it acts: {listed}. Probability of exactly this answer: {exactly}."]
 
 
-def _shares_are_determined(facts):
+def _shares_are_determined(facts: Facts) -> bool:
     """Whether the parts of the gap are shares of it, and not larger than the whole because of the noise."""
     shares = [effect["share"] or 0.0 for effect in facts["effects"]]
     shares.append(sum(part["share"] for part in _scatter_parts(facts)))
     return facts["gap_rms_mm"] > 0.0 and max(shares) <= OPTIONS.max_mentioned_share
 
 
-def _cause(effect, follow, with_shares, facts):
+def _cause(effect: Facts, follow: str, with_shares: bool, facts: Facts) -> str:
     """One effect: its share, or its size where shares are not determined, name, leg, sizes and meaning."""
     share = "Also there is"
     if effect["share"] is not None:
@@ -372,7 +381,7 @@ def _cause(effect, follow, with_shares, facts):
     return f"{said} {_NO_SIZE}" if unsized else said
 
 
-def _worst(places):
+def _worst(places: Sequence[Facts]) -> str:
     """Where the drive error is largest, of drives with the unit of the first place; empty without places."""
     if not places:
         return ""
@@ -383,21 +392,22 @@ def _worst(places):
     return f" It is largest for {worst['name']} at {at}: {size} off its mean over the measured range."
 
 
-def _sizes(parameters):
+def _sizes(parameters: Sequence[Facts]) -> list[str]:
     """Fitted values with their 95 % intervals; parameters with the same value have one entry."""
-    by_size = {}
+    by_size: dict[str, list[str]] = {}
     for row in parameters:
         # a compliance that may be zero is not found: its part has little load, or none that varies
         least, (low, high) = OPTIONS.min_compliance_ratio * abs(row["value"]), (row["low_95"], row["high_95"])
         found = not is_per_load(row["unit"]) or low > least or high < -least
         if found and np.isfinite(row["standard_error"] or np.nan):
             unit, factor = _READABLE.get(row["unit"], (row["unit"], 1.0))
-            size = with_interval(*(factor * row[key] for key in ("value", "low_95", "high_95")), unit)
+            value, least_95, most_95 = (factor * row[key] for key in ("value", "low_95", "high_95"))
+            size = with_interval(value, least_95, most_95, unit)
             by_size.setdefault(size, []).append(row["parameter"])
     return [f"{' = '.join(names)} = {size}" for size, names in by_size.items()]
 
 
-def _scatter(facts):
+def _scatter(facts: Facts) -> list[str]:
     """The share that does not repeat, where it acts and matters."""
     parts = _scatter_parts(facts, OPTIONS.min_scatter_probability)
     share = sum(part["share"] for part in parts)
@@ -416,13 +426,13 @@ def _scatter(facts):
     return [f"{size} does not repeat from pass to pass: no model can correct it."]
 
 
-def _scatter_parts(facts, least=0.0):
+def _scatter_parts(facts: Facts, least: float = 0.0) -> list[Facts]:
     """Parts of the gap that do not repeat and act with a least probability."""
     parts = (part for part in facts["budget"] if part["kind"] in ("scatter", "runs"))
     return [part for part in parts if not part["probability"] < least]
 
 
-def _left(facts):
+def _left(facts: Facts) -> list[str]:
     """Residual error with the effects in the simulator."""
     after, noise = (rounded(facts[name]) for name in ("gap_after_rms_mm", "noise_rms_mm"))
     what = "it" if len(facts["effects"]) == 1 else "them"
@@ -430,7 +440,7 @@ def _left(facts):
     return [f"With {what} in the simulator the residual error at left-out points is {size}."]
 
 
-def _open(facts):
+def _open(facts: Facts) -> list[str]:
     """What else may act: the named rivals, and what the advised runs would decide."""
     named = [effect["name"] for effect in facts["effects"]]
     contests = [_apart(run["separates"]) for run in facts["next"]]
@@ -447,13 +457,13 @@ def _open(facts):
     return [f"{first}: {', '.join(listed)}."]
 
 
-def _overlap(facts):
+def _overlap(facts: Facts) -> bool:
     """Whether shares of several effects add up to more than the whole by more than is mentioned."""
     shares = [effect["share"] or 0.0 for effect in facts["effects"]]
     return len(shares) > 1 and sum(shares) > 1.0 + OPTIONS.min_mentioned_share
 
 
-def _next(facts):
+def _next(facts: Facts) -> list[str]:
     """What to measure next, and what would decide where nothing that can be simulated does."""
     said = [_undecidable(facts)] if facts["undecided"] else []
     if facts["next"]:
@@ -474,7 +484,7 @@ def _next(facts):
     return ["Next: no further run that was tried in computation would settle it."]
 
 
-def _undecided(separates, drives):
+def _undecided(separates: str, drives: DriveWords) -> dict[str, Any] | None:
     """The two answers that no run decides between, and what to inspect instead of each cause; None where there are
     none.
     """
@@ -485,7 +495,7 @@ def _undecided(separates, drives):
     return {"separates": separates, "inspect": inspect}
 
 
-def _undecidable(facts):
+def _undecidable(facts: Facts) -> str:
     """What would decide between two answers where nothing that can be simulated does: inspection of their causes."""
     undecided = facts["undecided"]
     limited = " within the limits" if any(note.startswith(_LIMITED) for note in facts["notes"]) else ""
@@ -497,18 +507,18 @@ def _undecidable(facts):
     return f"{first}; inspection would. {would}"
 
 
-def _initial(text):
+def _initial(text: str) -> str:
     """A text with a capital first letter."""
     return text[:1].upper() + text[1:]
 
 
-def _contest(separates):
+def _contest(separates: str) -> str:
     """The difference between two answers "a+b / a+c", in words."""
     sides = [" + ".join(map(readable, sorted(side))) for side in _apart(separates)]
     return f"between {sides[0]} and {sides[1]}" if all(sides) else f"whether {''.join(sides)} acts"
 
 
-def _apart(separates):
+def _apart(separates: str) -> tuple[set[str], set[str]]:
     """The effects, as two sets, that one of two answers "a+b / a+c" has and the other has not."""
     first, second = (set(side.split("+")) - {"none"} for side in separates.split(" / "))
     return first - second, second - first

@@ -6,19 +6,23 @@ The discrepancy's covariance along a run is diagonal in its cosine basis, as is 
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TypeAlias
 
 import numpy as np
 
 from rrru.campaign.noise import along_runs
+from rrru.diagnosis.aliases import FloatArray, IntArray
+from rrru.diagnosis.discrepancy_basis import Library
 from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.payload_nuisance import WEIGHT
+from rrru.diagnosis.state import LinearizedProblem
 from rrru.diagnosis.terms import EACH, SAME, legs_alike, spread
 from rrru.estimation.noise_model import NoiseModel, lengths
 
 DISCREPANCY_SCALES = np.array([0.0, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1000.0])
 
 
-def discrepancy_scales(noise):
+def discrepancy_scales(noise: NoiseModel) -> FloatArray:
     """Deviations (levels,) of the discrepancy over those of a NoiseModel: DISCREPANCY_SCALES, moved so that one is what
     it found.
 
@@ -27,13 +31,17 @@ def discrepancy_scales(noise):
     if not noise.discrepancy:
         return DISCREPANCY_SCALES
     nearest = DISCREPANCY_SCALES[1 + np.abs(np.log(DISCREPANCY_SCALES[1:] / noise.discrepancy)).argmin()]
-    return DISCREPANCY_SCALES * noise.discrepancy / nearest
+    return np.asarray(DISCREPANCY_SCALES * noise.discrepancy / nearest)
 
 
-def spectrum(wave):
+def spectrum(wave: FloatArray) -> FloatArray:
     """Variance (n,) of the discrepancy by half-wave number (n,), 1 on average."""
     density = 1.0 / (1.0 + (wave / OPTIONS.discrepancy_half_density_wave_number) ** 2) + OPTIONS.discrepancy_white_share
-    return density / density.mean()
+    return np.asarray(density / density.mean())
+
+
+# columns of an effect in a shape on "each" leg, the "same" on all, or of "weight"; of the shape of an effect
+ColumnKey: TypeAlias = tuple[str, int, str] | str
 
 
 @dataclass(frozen=True)
@@ -44,22 +52,24 @@ class Whitened:
     a NoiseModel.
     """
 
-    library: dict
-    linear: object
-    run: np.ndarray
+    library: Library
+    linear: LinearizedProblem
+    run: IntArray
     noise: NoiseModel
 
-    def __len__(self):
+    def __len__(self) -> int:
         return len(self.run)
 
     @cached_property
-    def layout(self):
+    def layout(self) -> tuple[dict[ColumnKey, IntArray], FloatArray]:
         """Numbers of all columns but the calibration's by (effect, shape, "each" or "same") and effect.
 
         With the matrix (K, k) that makes them, those of one value on all legs being sums, of the linearisation's.
         """
         linear = self.linear
-        blocks = [((*key, EACH), columns.shape[-1]) for key, columns in linear.columns.items()]
+        blocks: list[tuple[ColumnKey, int]] = [
+            ((*key, EACH), columns.shape[-1]) for key, columns in linear.columns.items()
+        ]
         blocks += [(name, columns.shape[-1]) for name, columns in linear.shape_columns.items()]
         blocks += [((*key, WEIGHT), columns.shape[-1]) for key, columns in linear.by_weight.items()]
         ends = np.cumsum([0, *(size for _, size in blocks)])
@@ -74,7 +84,7 @@ class Whitened:
         return numbers, np.concatenate(made, axis=1)
 
     @cached_property
-    def _together(self):
+    def _together(self) -> tuple[FloatArray, FloatArray]:
         """Columns of calibration and effects, and the data, (m, 3, k), by the runs' cosines; waves (m,)."""
         linear = self.linear
         nuisance = *linear.shape_columns.values(), *linear.by_weight.values()
@@ -82,7 +92,7 @@ class Whitened:
         return along_runs(np.concatenate(blocks, axis=-1), self.run)
 
     @cached_property
-    def whole(self):
+    def whole(self) -> FloatArray:
         """Sum of squares (k,) of each column over the noise, the calibration not projected out."""
         # cosines change no sum of squares
         columns = self._together[0][..., self.linear.base.shape[-1] : -1].reshape(3 * len(self), -1)
@@ -90,11 +100,11 @@ class Whitened:
         return np.concatenate([np.einsum("ij,ij->j", part, part) for part in (columns, sums)]) / self.noise.mean_mm**2
 
     @cached_property
-    def _made(self):
+    def _made(self) -> dict[int, tuple[FloatArray, FloatArray, float]]:
         """Grams of the levels that have been asked for."""
         return {}
 
-    def _white(self, level):
+    def _white(self, level: int) -> tuple[FloatArray, FloatArray, int]:
         """Whitened columns (m, k), of which the first p are the calibration's; variances; and p.
 
         The last rows are the priors of the calibration's parameters.
@@ -115,7 +125,7 @@ class Whitened:
         white[variance.size :] = prior
         return white, variance, p
 
-    def gram(self, level):
+    def gram(self, level: int) -> tuple[FloatArray, FloatArray, float]:
         """Gram matrix (k, k) of the whitened columns at a level (an index), their moments (k,), log evidence of none.
 
         The calibration is projected out.

@@ -19,9 +19,9 @@ from rrru.campaign.plan import make_plan
 from rrru.campaign.stated_motion import DRIVES, STOP_AND_GO, StatedMotion
 from rrru.campaign.trajectories import Line, Spiral
 from rrru.diagnosis.diagnose import with_wide_bounds
-from rrru.diagnosis.make_problem import make_case
+from rrru.diagnosis.make_problem import make_diagnosis_problem
 from rrru.diagnosis.options import OPTIONS
-from rrru.diagnosis.state import State
+from rrru.diagnosis.state import ModelState
 from rrru.effects.causes import cause_texts
 from rrru.effects.library import NAMES, library
 from rrru.effects.protocol import PATH
@@ -85,8 +85,8 @@ class Scene:
     stops: bool = False
 
     @cache  # noqa: B019  there are few scenes, and none ends before the program does
-    def case(self):
-        """The Case of the campaign, with all effects of the library that it can test."""
+    def problem(self):
+        """The DiagnosisProblem of the campaign, with all effects of the library that it can test."""
         plan = make_plan(self.trajectories, _PASSES, _SPEED_MM_S, _ACCELERATION_MM_S2, _DWELL_S)
         plan = plan.resting(SETTLE_S) if self.stops else plan
         robot = self.robot()
@@ -94,7 +94,7 @@ class Scene:
         frame = frame.assign(temperature_c=20.0 + _WARMING_K * np.linspace(0.0, 1.0, len(frame)) ** 2)
         frame = frame.assign(**StatedMotion(STOP_AND_GO, DRIVES).columns()) if self.stops else frame
         mechanism = with_wide_bounds(as_measured(robot, frame))
-        return make_case(frame, mechanism, Masses(), _NOISE_MM, library(mechanism))
+        return make_diagnosis_problem(frame, mechanism, Masses(), _NOISE_MM, library(mechanism))
 
     @cache  # noqa: B019
     def visible(self):
@@ -102,13 +102,13 @@ class Scene:
 
         Columns of all shapes follow one another; those of the first shape come first.
         """
-        case = self.case()
-        linear = case.linearise(State(np.zeros(len(case.mechanism.parameters)), {}))
-        base, _ = np.linalg.qr(linear.base.reshape(3 * len(case), -1))
+        problem = self.problem()
+        linear = problem.linearise(ModelState(np.zeros(len(problem.mechanism.parameters)), {}))
+        base, _ = np.linalg.qr(linear.base.reshape(3 * len(problem), -1))
         result = {}
-        for name, effect in case.effects.items():
+        for name, effect in problem.effects.items():
             shapes = range(len(effect.coordinates.shapes))
-            raw = [linear.columns[name, k].reshape(3 * len(case), -1) * effect.coordinates.typical for k in shapes]
+            raw = [linear.columns[name, k].reshape(3 * len(problem), -1) * effect.coordinates.typical for k in shapes]
             raw = np.concatenate(raw, axis=1)
             result[name] = raw - base @ (base.T @ raw), raw
         return result
@@ -258,12 +258,12 @@ def _cells(name, scenes):
 
 def _rivals(scene, name):
     """What an effect is confounded with on a scene, in words."""
-    case = scene.case()
-    if name not in library(case.mechanism):
+    problem = scene.problem()
+    if name not in library(problem.mechanism):
         return "not an effect of this robot"
-    if name in case.untestable:
-        return f"not tested: {case.untestable[name]}"
-    if not len(case.library[name].coordinates):
+    if name in problem.untestable:
+        return f"not tested: {problem.untestable[name]}"
+    if not len(problem.library[name].coordinates):
         return "open: its orders are those that a campaign's data show"
     rivals = confounded(scene, name)
     if rivals is None:
@@ -298,7 +298,7 @@ def _capital(text):
 
 def _made(name):
     """The effect on the first robot here that can have it."""
-    robots = (*(scene.case().mechanism for scene in SCENES), _two_arms())
+    robots = (*(scene.problem().mechanism for scene in SCENES), _two_arms())
     return next(effect for robot in robots if (effect := library(robot).get(name)))
 
 
@@ -355,7 +355,7 @@ def _picture(name, scenes):
     height = _PANEL_HEIGHT * len(scenes)
     parts = [f'<svg xmlns="http://www.w3.org/2000/svg" width="{_WIDTH}" height="{height}" font-family="sans-serif">']
     for number, scene in enumerate(scenes):
-        left = scene.visible()[name][0][:, : len(scene.case().library[name].coordinates)]
+        left = scene.visible()[name][0][:, : len(scene.problem().library[name].coordinates)]
         largest = left[:, np.argmax(np.linalg.norm(left, axis=0).round(12))]
         parts += _panel(scene, largest.reshape(-1, 3), number * _PANEL_HEIGHT)
     return "\n".join([*parts, "</svg>", ""])
@@ -369,7 +369,7 @@ def _panel(scene, moved_mm, top):
     title = f"{scene.title}, {len(moved_mm)} readings in the order driven; full height &#177;{1e3 * most:.2g} &#181;m"
     yield f'<text x="0" y="{top + 12}" font-size="12">{title}</text>'
     yield f'<path d="M0 {middle:g}H{_WIDTH}" stroke="#999" stroke-width="0.5"/>'
-    run = scene.case().measurements["run"].to_numpy()[scene.case().at]
+    run = scene.problem().measurements["run"].to_numpy()[scene.problem().at]
     for number in [k for k, (a, b) in enumerate(pairwise(run), 1) if a != b]:
         place = (number - 0.5) * across
         yield f'<path d="M{place:.1f} {top + _TITLE_HEIGHT}v{2 * _HALF_HEIGHT}" stroke="#ddd" stroke-width="0.5"/>'

@@ -10,7 +10,7 @@ import pandas as pd
 from scipy.spatial.transform import Rotation
 
 from rrru.campaign import measurements as rows
-from rrru.diagnosis.make_problem import make_case
+from rrru.diagnosis.make_problem import make_diagnosis_problem
 from rrru.effects.library import find
 from rrru.effects.protocol import ActiveEffect, together
 from rrru.kinematics.base_parameters import MeasurementConfig
@@ -61,7 +61,7 @@ def measure(effects=(), count=200, seed=1, noise=(NOISE_MM, NOISE_RAD)):
     drive = drives(count, generator)
     frame = commands(drive)
     frame = frame.assign(**rows.vector_columns("measured", rows.command(frame)))
-    motion = make_case(frame, ARM, MASSES, 1.0, {}).motion
+    motion = make_diagnosis_problem(frame, ARM, MASSES, 1.0, {}).motion
     twists = ARM.twists_of(ERRORS) + together(effects, motion).twists
     poses = ARM.solve(drive, rows.command(frame), twists)
     assert poses.closed.all()
@@ -71,10 +71,10 @@ def measure(effects=(), count=200, seed=1, noise=(NOISE_MM, NOISE_RAD)):
     return frame.assign(**rows.vector_columns("measured", position), **turns)
 
 
-def case_of(frame, *names, library=None):
-    """The case of a table, with some effects of the library, at the noise that it has."""
+def problem_of(frame, *names, library=None):
+    """The problem of a table, with some effects of the library, at the noise that it has."""
     effects = {name: find(name, ARM) for name in names} | (library or {})
-    return make_case(frame, reading(frame), MASSES, NOISE_MM, effects, arm_mm=NOISE_MM / NOISE_RAD)
+    return make_diagnosis_problem(frame, reading(frame), MASSES, NOISE_MM, effects, arm_mm=NOISE_MM / NOISE_RAD)
 
 
 def reading(frame):

@@ -11,7 +11,7 @@ from rrru.campaign import measurements as rows
 from rrru.campaign.plan import make_plan
 from rrru.campaign.trajectories import Line, Spiral
 from rrru.diagnosis.diagnose import MeasuredRobot, diagnose, with_wide_bounds
-from rrru.diagnosis.make_problem import make_case
+from rrru.diagnosis.make_problem import make_diagnosis_problem
 from rrru.diagnosis.settings import GapSettings
 from rrru.effects.protocol import ActiveEffect
 from rrru.estimation.observations.target_positions import TargetPositions
@@ -93,9 +93,9 @@ def strong(name, strength, seed=0, leg=0, shape=0):
     return active(name, coordinates, shape)
 
 
-def case_of(measurements, library=EFFECTS, noise_mm=NOISE_MM):
-    """The diagnosis' case of a measurement table."""
-    return make_case(measurements, MODEL, MASSES, noise_mm, dict(library))
+def problem_of(measurements, library=EFFECTS, noise_mm=NOISE_MM):
+    """The diagnosis' problem of a measurement table."""
+    return make_diagnosis_problem(measurements, MODEL, MASSES, noise_mm, dict(library))
 
 
 def diagnosed(measurements, noise_mm=NOISE_MM, details=False, settings=None):

@@ -66,16 +66,16 @@ def without_nuisance(linear):
 def tripod_evidence():
     """Evidence of a 3-RRRU on which backlash and compliance act, both about as large as the noise."""
     acting = campaigns.strong("backlash", 0.5), campaigns.strong("drive_compliance", 1.0, 1)
-    case = campaigns.case_of(campaigns.measure(acting))
-    return case.evidence(without_nuisance(case.linearise(calibrate(case))))
+    problem = campaigns.problem_of(campaigns.measure(acting))
+    return problem.evidence(without_nuisance(problem.linearise(calibrate(problem))))
 
 
 @cache
 def arm_evidence():
     """Evidence of a six-axis arm with soft joints, some of them too stiff to be seen."""
     soft = arms.active("drive_compliance", [0.0, 2e-9, 1e-9, 0.0, 1e-10, 0.0])
-    case = arms.case_of(arms.measure((soft,), 60), "backlash", "drive_compliance", "encoder_eccentricity")
-    return case.evidence(without_nuisance(case.linearise(calibrate(case))))
+    problem = arms.problem_of(arms.measure((soft,), 60), "backlash", "drive_compliance", "encoder_eccentricity")
+    return problem.evidence(without_nuisance(problem.linearise(calibrate(problem))))
 
 
 def _of_robot(name, evidence, terms, prior_scale, level):

@@ -12,12 +12,12 @@ from rrru.diagnosis.approach_direction import at_reversals, read_back_jitter, re
 from rrru.diagnosis.determined import require_determined
 from rrru.diagnosis.diagnose import with_wide_bounds
 from rrru.diagnosis.inference import infer
-from rrru.diagnosis.make_problem import make_case
+from rrru.diagnosis.make_problem import make_diagnosis_problem
 from rrru.diagnosis.model_fit import fit_model
 from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.problem import GEOMETRY
 from rrru.diagnosis.settings import Prior
-from rrru.diagnosis.state import State
+from rrru.diagnosis.state import ModelState
 from rrru.effects.backlash import play
 from rrru.effects.library import find
 from rrru.effects.protocol import together
@@ -25,7 +25,7 @@ from rrru.errors import FitError
 from rrru.kinematics.inverse import inverse_kinematics
 from rrru.pipeline.setup import as_measured
 from tests.diagnosis import arms
-from tests.diagnosis.campaigns import ROBOT, active, case_of, measure, plan_of, robot_of, strong
+from tests.diagnosis.campaigns import ROBOT, active, measure, plan_of, problem_of, robot_of, strong
 
 ERRORS = np.array([2e-3, -1e-3, 1.5e-3, 0.4, -0.3, 0.5, 0.2])
 WIDTHS = np.full(3, 1e-8)
@@ -81,72 +81,72 @@ def test_what_jitters_does_not_turn_back():
 
 
 def _driven(effects, widths):
-    """A campaign's case, and the sense (n, 3) in which the drives of the robot came to its points."""
-    case = case_of(measure(effects))
+    """A campaign's problem, and the sense (n, 3) in which the drives of the robot came to its points."""
+    problem = problem_of(measure(effects))
     driven = robot_of().motion(plan_of(), ROBOT.inverse)
     share = play(np.ascontiguousarray(driven.path_drive), 0.5 * widths)[driven.path_index] / (-0.5 * widths)
-    return case, share
+    return problem, share
 
 
 def test_known_senses_are_those_that_were_driven_and_open_ones_are_found_from_strong_backlash():
     widths = np.array([2e-3, 2e-3, 2e-3])
-    case, share = _driven((active("backlash", widths),), widths)
-    state = State(ERRORS, {("backlash", 0): widths})
-    motion, known = case.motion, case.known["backlash"]
+    problem, share = _driven((active("backlash", widths),), widths)
+    state = ModelState(ERRORS, {("backlash", 0): widths})
+    motion, known = problem.motion, problem.known["backlash"]
     own = play(np.ascontiguousarray(motion.path_drive), 0.5 * widths)[motion.path_index] / (-0.5 * widths)
     # the path between the points is an interpolation
     np.testing.assert_allclose(own[known], share[known], atol=0.1)
-    found = case.with_approach(state).motion.approach
+    found = problem.with_approach(state).motion.approach
     unknown = np.isfinite(found)
     assert unknown.sum() > 30 and (np.abs(found[unknown] - share[unknown]) < 0.2).mean() > 0.9
 
 
 def test_expected_senses_are_those_of_all_combinations_one_by_one():
     widths = np.array([1e-4, 3e-4, 2e-4])
-    case, _ = _driven((active("backlash", widths),), widths)
-    state = State(ERRORS, {("backlash", 0): widths})
-    found = case.with_approach(state).motion.approach
+    problem, _ = _driven((active("backlash", widths),), widths)
+    state = ModelState(ERRORS, {("backlash", 0): widths})
+    found = problem.with_approach(state).motion.approach
     point = 0
     weights, senses = [], []
     for sense in product((-1.0, 1.0), repeat=3):
-        approach = case.motion.approach.copy()
+        approach = problem.motion.approach.copy()
         approach[point] = sense
-        left = replace(case, motion=replace(case.motion, approach=approach)).residual(state)[point]
-        weights.append(np.exp(-0.5 * (left**2).sum() / case.noise_mm**2))
+        left = replace(problem, motion=replace(problem.motion, approach=approach)).residual(state)[point]
+        weights.append(np.exp(-0.5 * (left**2).sum() / problem.noise_mm**2))
         senses.append(sense)
     expected = np.average(senses, axis=0, weights=weights)
     np.testing.assert_allclose(found[point], expected, atol=0.02)
 
 
-def _open(case, share, seed=0):
-    """The case with the senses of a share of its points open, too, whatever its rows determine."""
-    approach, made = case.motion.approach.copy(), case.motion_at
+def _open(problem, share, seed=0):
+    """The problem with the senses of a share of its points open, too, whatever its rows determine."""
+    approach, made = problem.motion.approach.copy(), problem.motion_at
     approach[np.random.default_rng(seed).random(len(approach)) < share] = 0.0
 
     def motion_at(*stands):
         return replace(made(*stands), approach=approach)
 
     known = {"backlash": np.isnan(approach).all(axis=1)}
-    return replace(case, motion=motion_at(), motion_at=motion_at, known=known)
+    return replace(problem, motion=motion_at(), motion_at=motion_at, known=known)
 
 
 @pytest.mark.parametrize("acting", [(), ("backlash",), ("drive_compliance",), ("encoder_eccentricity", "backlash")])
 def test_open_senses_change_no_verdict_and_every_reading_counts(acting):
     """At two thirds of the points the senses are unknown; the robot's errors are found as if they were known."""
     frame = measure(tuple(strong(name, 4.0) for name in acting))
-    found = infer(_open(case_of(frame), 0.66), Prior())
-    assert found.case.count == len(frame) and found.case.known["backlash"].mean() < 0.35
+    found = infer(_open(problem_of(frame), 0.66), Prior())
+    assert found.problem.count == len(frame) and found.problem.known["backlash"].mean() < 0.35
     assert found.hypothesis.effects == set(acting) and found.posterior.marginal("backlash") > 0.9 * (
         "backlash" in acting
     )
     # the open senses are found where backlash acts: no more than the noise is left
-    assert np.sqrt((found.case.residual(found.state) ** 2).mean()) < 1.2 * found.case.noise_mm
+    assert np.sqrt((found.problem.residual(found.state) ** 2).mean()) < 1.2 * found.problem.noise_mm
 
 
 def test_a_set_confounded_with_backlash_does_not_win_by_the_readings_of_open_senses():
     """An effect of the drives' values may explain readings at which backlash predicts nothing: that does not count."""
-    case = _open(case_of(measure((strong("backlash", 4.0),))), 0.66)
-    found = infer(case, Prior()).posterior
+    problem = _open(problem_of(measure((strong("backlash", 4.0),))), 0.66)
+    found = infer(problem, Prior()).posterior
     assert found.sets()[frozenset({"backlash"}), False] > 0.8 and found.probability_unexplained < 0.1
 
 
@@ -168,7 +168,7 @@ def _along_lines(effects, jitter_rad, seed=4):
     drive = np.concatenate(lines)
     frame = arms.commands(drive).assign(run=run)
     measured = rows.vector_columns("measured", rows.command(frame))
-    motion = make_case(frame.assign(**measured), arm, arms.MASSES, 1.0, {}).motion
+    motion = make_diagnosis_problem(frame.assign(**measured), arm, arms.MASSES, 1.0, {}).motion
     # the robot itself knows how it came
     motion = replace(motion, approach=np.full_like(motion.drive, np.nan))
     twists = arm.twists_of(arms.ERRORS) + together(effects, motion).twists
@@ -180,10 +180,12 @@ def _along_lines(effects, jitter_rad, seed=4):
 
 
 def _of_arm(frame, *names):
-    """The case of an arm's table, with all that its readings determine."""
+    """The problem of an arm's table, with all that its readings determine."""
     library = {name: find(name, arms.ARM) for name in names}
     robot = as_measured(replace(arms.ARM, parameter_set="full"), frame, (), False)
-    return require_determined(make_case(frame, with_wide_bounds(robot), arms.MASSES, arms.NOISE_MM, library))
+    return require_determined(
+        make_diagnosis_problem(frame, with_wide_bounds(robot), arms.MASSES, arms.NOISE_MM, library)
+    )
 
 
 @pytest.fixture(scope="module")
@@ -196,8 +198,8 @@ def along_lines():
 def test_jitter_of_joint_values_changes_neither_verdict_nor_errors(along_lines):
     plain, jittered = along_lines
     # at the very first reading the simulated backlash is in its middle, which is no side
-    assert plain.case.used[1:].all() and jittered.case.used[1:].all()
-    assert jittered.case.known["backlash"].mean() > 0.8 * plain.case.known["backlash"].mean() > 0.5
+    assert plain.problem.used[1:].all() and jittered.problem.used[1:].all()
+    assert jittered.problem.known["backlash"].mean() > 0.8 * plain.problem.known["backlash"].mean() > 0.5
     assert plain.hypothesis.effects == jittered.hypothesis.effects == {"backlash"}
     first, second = (np.nan_to_num(found.fit.estimate.block_errors(GEOMETRY)) for found in along_lines)
     off = (plain.state.deviations - jittered.state.deviations) / np.hypot(first, second)
@@ -209,35 +211,35 @@ def test_where_hardly_a_sense_is_known_only_backlash_is_not_tested():
     stiff = np.array([0.0, 6e-9, 1.2e-8, 0.0, 2e-8, 0.0])
     frame = arms.measure((arms.active("drive_compliance", stiff),), 250)
     frame["run"] = np.maximum(np.arange(len(frame)) - 4, 1)
-    case = require_determined(arms.case_of(frame, "backlash", "drive_compliance", "read_before_rest"))
-    assert case.used.all() and set(case.effects) == {"drive_compliance", "read_before_rest"}
-    assert "is known at 5 of 250 points; allowed: at least 50% of them" in case.untestable["backlash"]
-    found = infer(case, Prior())
-    assert found.hypothesis.effects == {"drive_compliance"} and found.case.count == 250
+    problem = require_determined(arms.problem_of(frame, "backlash", "drive_compliance", "read_before_rest"))
+    assert problem.used.all() and set(problem.effects) == {"drive_compliance", "read_before_rest"}
+    assert "is known at 5 of 250 points; allowed: at least 50% of them" in problem.untestable["backlash"]
+    found = infer(problem, Prior())
+    assert found.hypothesis.effects == {"drive_compliance"} and found.problem.count == 250
 
 
 def test_too_few_readings_are_refused_with_what_to_do():
     frame = arms.measure((), 10)
-    case = arms.case_of(frame)
-    count = len(case.mechanism.parameters)
+    problem = arms.problem_of(frame)
+    count = len(problem.mechanism.parameters)
     least = count + OPTIONS.min_spare_numbers
     more = int(np.ceil((least - 30) / 3.0))
     message = f"30 numbers read at 10 poses .* {count} parameters; .* least {least}: measure {more} more"
     with pytest.raises(FitError, match=message):
-        require_determined(arms.case_of(frame.drop(columns=[f"measured_r{axis}_rad" for axis in "xyz"])))
+        require_determined(arms.problem_of(frame.drop(columns=[f"measured_r{axis}_rad" for axis in "xyz"])))
 
 
 def test_poses_that_leave_a_number_open_are_diagnosed_as_far_as_they_determine_it():
-    case = arms.case_of(arms.measure((), 200))
-    same = {name: case.measurements[name].iloc[0] for name in arms.ARM.parts.columns[:2]}
-    still = case.measurements.assign(**same)
+    problem = arms.problem_of(arms.measure((), 200))
+    same = {name: problem.measurements[name].iloc[0] for name in arms.ARM.parts.columns[:2]}
+    still = problem.measurements.assign(**same)
     drive = rows.actuators(still, arms.ARM)
     place, generator = arms.ARM.forward(drive), np.random.default_rng(1)
     seen = place + arms.NOISE_MM * generator.standard_normal(place.shape)
     still = still.assign(**rows.vector_columns("command", place), **rows.vector_columns("measured", seen))
     still = still.drop(columns=[name for name in still if name.startswith("measured_r")])
-    open_case = require_determined(arms.case_of(still))
-    fit = fit_model(open_case, [State(np.zeros(len(open_case.mechanism.parameters)), {})])
+    open_problem = require_determined(arms.problem_of(still))
+    fit = fit_model(open_problem, [ModelState(np.zeros(len(open_problem.mechanism.parameters)), {})])
     errors = fit.estimate.standard_errors
     assert fit.estimate.rank < len(errors) and np.isfinite(errors).all()
     # what the poses do not determine has the error of its prior

@@ -7,7 +7,7 @@ import pytest
 
 from rrru.campaign import measurements as rows
 from rrru.diagnosis.diagnose import MeasuredRobot, diagnose
-from rrru.diagnosis.make_problem import make_case
+from rrru.diagnosis.make_problem import make_diagnosis_problem
 from rrru.diagnosis.result_notes import MASSES_UNKNOWN
 from rrru.diagnosis.settings import GapSettings
 from rrru.diagnosis.verdict_text import answer
@@ -46,9 +46,9 @@ def test_distances_are_those_of_positions_where_orientations_are_read_too():
     frame = arms.measure((acting,), _COUNT, 1, noise)
     robot = MeasuredRobot(arms.reading(frame), arms.MASSES, noise[0], "arm", noise[1])
     found = diagnose(frame, robot, GapSettings(("encoder_eccentricity",), draws=50))
-    case = found.inference.case
-    assert case.arm_mm == pytest.approx(5000.0)
-    left = case.left(found.inference.calibrated)[: len(frame)]
+    problem = found.inference.problem
+    assert problem.arm_mm == pytest.approx(5000.0)
+    left = problem.left(found.inference.calibrated)[: len(frame)]
     squares = (left**2).sum(axis=1) - 3.0 * noise[0] ** 2
     true = np.sqrt(squares.mean())
     assert found.verdict["gap_rms_mm"] == pytest.approx(true, rel=0.1)
@@ -85,8 +85,8 @@ def test_a_rough_function_of_all_drives_is_named(spectrum, seed):
     assert found.verdict["noise_rms_mm"] == pytest.approx(np.sqrt(3.0) * arms.NOISE_MM, rel=0.15)
     (values,) = found.state.effects.values()
     # functions along the drives' ranges, except for what the calibration's own parameters make
-    motion = found.inference.case.motion
-    effect = found.inference.case.library["drive_error_function"]
+    motion = found.inference.problem.motion
+    effect = found.inference.problem.library["drive_error_function"]
     made = zip(effect.along_drives(motion), acting.effect.along_drives(motion), np.split(truth, 6), strict=True)
     for drive, (functions, every, true) in enumerate(made, 1):
         whole = every @ true
@@ -114,13 +114,13 @@ def test_three_sharp_orders_of_different_drives_are_named(waves, size_rad):
     acting, size = _sharp(waves, size_rad, 4)
     found = _diagnosed((acting,), 4)
     assert found.verdict["effects"] == "transmission_orders" and found.verdict["share_closed"] > 0.7
-    case = found.inference.case
-    effect, (values,) = case.library["transmission_orders"], found.state.effects.values()
+    problem = found.inference.problem
+    effect, (values,) = problem.library["transmission_orders"], found.state.effects.values()
     amplitudes = {}
     for parameter, sine, cosine in zip(effect.parameters.names[::2], values[::2], values[1::2], strict=True):
         _, drive, order = parameter.split("_")
         amplitudes[int(drive) - 1, float(order)] = np.hypot(sine, cosine)
-    step = 2.0 * np.pi / np.ptp(case.motion.drive, axis=0)
+    step = 2.0 * np.pi / np.ptp(problem.motion.drive, axis=0)
     for (drive, order), amplitude in zip(waves, size, strict=True):
         near = [a for (k, one), a in amplitudes.items() if k == drive and abs(one - order) < 0.3 * step[k]]
         assert near and max(near) == pytest.approx(amplitude, rel=0.35)
@@ -134,7 +134,7 @@ def test_sharp_orders_are_found_behind_an_effect_that_hides_them():
     # one drive's wave is a transmission error of that drive alone as well
     assert {"drive_compliance", "transmission_orders"} <= named
     assert named <= {"drive_compliance", "transmission_orders", "transmission_error"}
-    waves = list(found.inference.case.library["transmission_orders"].waves)
+    waves = list(found.inference.problem.library["transmission_orders"].waves)
     if "transmission_error" in named:
         own = found.tables["gap_parameters"].set_index(["effect", "parameter"])["value"]["transmission_error"]
         waves.append((int(own.filter(like="amplitude").argmax()), own["ratio"]))
@@ -147,7 +147,7 @@ def test_sharp_orders_are_found_behind_an_effect_that_hides_them():
 def test_nothing_is_named_where_nothing_acts(seed):
     found = _diagnosed((), seed)
     assert found.verdict["effects"] == "none" and found.verdict["probability"] > 0.5
-    assert "transmission_orders" not in found.inference.case.library
+    assert "transmission_orders" not in found.inference.problem.library
     assert found.verdict["gap_rms_mm"] < 0.5 * found.verdict["noise_rms_mm"]
 
 
@@ -158,7 +158,7 @@ def _soft(robot, payload_kg, noise_mm=0.02, effects=("drive_compliance", "encode
     frame = frame.assign(payload_kg=np.repeat([0.0, payload_kg], 60), run=np.repeat([1, 2], 60))
     frame = frame.assign(**rows.vector_columns("measured", rows.command(frame)))
     springs = arms.active("drive_compliance", [0.0, 8e-9, 8e-9, 0.0, 0.0, 0.0])
-    motion = make_case(frame, arms.ARM, arms.MASSES, 1.0, {}).motion
+    motion = make_diagnosis_problem(frame, arms.ARM, arms.MASSES, 1.0, {}).motion
     twists = arms.ARM.twists_of(arms.ERRORS) + springs.contribute(motion).twists
     position = arms.ARM.measured(arms.ARM.solve(drive, rows.command(frame), twists), twists)
     frame = frame.assign(**rows.vector_columns("measured", position + noise_mm * generator.standard_normal((120, 3))))

@@ -74,7 +74,7 @@ def test_what_the_linear_model_lacks_is_not_unexplained():
     """A robot on which it was, 0.026 mm, though the effect is the plant's own and the exact model fits to the noise."""
     known, found = _diagnosed(_WITH_BACKLASH, 260711)
     assert found.verdict["effects"] == "backlash"
-    left = found.inference.case.residual(found.state)
+    left = found.inference.problem.residual(found.state)
     assert np.sqrt((left**2).mean()) == pytest.approx(known.noise_mm, rel=0.1)
 
 
@@ -85,5 +85,5 @@ def test_a_fit_gets_away_from_where_the_calibration_went_to_hide_the_effect():
     names = [f"clearance{member}" for member in range(1, 7)]
     off = (rows.loc[names, "value"] - np.array(_SLACK)) / rows.loc[names, "standard_error"]
     assert np.abs(off).max() < 3.0
-    left = found.inference.case.residual(found.state)
+    left = found.inference.problem.residual(found.state)
     assert np.sqrt((left**2).mean()) == pytest.approx(known.noise_mm, rel=0.1)

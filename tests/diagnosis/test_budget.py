@@ -52,8 +52,8 @@ def test_parts_add_up_to_the_gap(two):
     assert budget["share"].sum() == pytest.approx(1.0, abs=1e-9)
     without = budget.drop("calibration")
     squares = np.sign(without["rms_mm"]) * without["rms_mm"] ** 2
-    residual = found.inference.case.residual(found.inference.calibrated)
-    noise = 3.0 * (found.inference.case.noise.axis_mm**2).mean()
+    residual = found.inference.problem.residual(found.inference.calibrated)
+    noise = 3.0 * (found.inference.problem.noise.axis_mm**2).mean()
     assert squares.sum() == pytest.approx((residual**2).sum(axis=1).mean() - noise, rel=0.05)
     assert (budget["share_low"] <= budget["share"]).all() and (budget["share"] <= budget["share_high"]).all()
 

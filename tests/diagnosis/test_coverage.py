@@ -124,8 +124,8 @@ def _held_out_of_targets(generator, poses=120):
     data = NOISE_MM * generator.standard_normal((count, 3))
     linear = LinearizedProblem(data, columns, {}, {}, {}, np.zeros((count, 3, 0)))
     points = pd.DataFrame({"trajectory": "poses", "run": run})
-    case = SimpleNamespace(points=points, run=run, stop=np.arange(count), series=run, noise_mm=NOISE_MM)
-    return HeldOut(case, ModelEvidence({}, linear, run, NoiseModel.white(NOISE_MM), False)), columns
+    problem = SimpleNamespace(points=points, run=run, stop=np.arange(count), series=run, noise_mm=NOISE_MM)
+    return HeldOut(problem, ModelEvidence({}, linear, run, NoiseModel.white(NOISE_MM), False)), columns
 
 
 @pytest.mark.parametrize("seed", range(5))

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from rrru.diagnosis.discrepancy_basis import UNKNOWN, unknown_functions
-from rrru.diagnosis.make_problem import make_case
+from rrru.diagnosis.make_problem import make_diagnosis_problem
 from rrru.diagnosis.payload_nuisance import WEIGHT
 from rrru.diagnosis.problem import GEOMETRY
 from rrru.effects.library import RESERVED
 from rrru.effects.protocol import Contribution
 from rrru.robots.delta import Delta
 from rrru.robots.ptt3 import Ptt3
-from tests.diagnosis.campaigns import MASSES, MODEL, NOISE_MM, case_of, diagnosed, measure, robot_of
+from tests.diagnosis.campaigns import MASSES, MODEL, NOISE_MM, diagnosed, measure, problem_of, robot_of
 
 
 def test_no_effect_of_a_user_s_can_have_the_name_of_a_part_of_the_results():
@@ -33,17 +33,17 @@ def test_no_effect_of_a_user_s_can_have_the_name_of_a_part_of_the_results():
 
 
 @pytest.fixture(scope="module")
-def case():
-    return case_of(measure())
+def problem():
+    return problem_of(measure())
 
 
 @pytest.mark.parametrize("name", UNKNOWN)
-def test_a_function_is_linear_in_its_coefficients_and_about_as_large_as_they_are(case, name):
+def test_a_function_is_linear_in_its_coefficients_and_about_as_large_as_they_are(problem, name):
     function, generator = UNKNOWN[name], np.random.default_rng(4)
     first, second = (generator.standard_normal(len(function.coordinates)) for _ in range(2))
 
     def made(values):
-        twists = function.contribute(case.motion, values).twists
+        twists = function.contribute(problem.motion, values).twists
         acting = {MODEL.legs.sites[k] for k in np.flatnonzero(twists.any(axis=(0, 2)))}
         assert acting <= ({f"leg {leg} drive" for leg in (1, 2, 3)} if function.per_leg else {"world"})
         return twists
@@ -54,14 +54,14 @@ def test_a_function_is_linear_in_its_coefficients_and_about_as_large_as_they_are
         assert 0.5 <= one.max() <= 1.0 + 1e-12
 
 
-def test_a_constant_shift_moves_the_reading_by_it(case):
+def test_a_constant_shift_moves_the_reading_by_it(problem):
     function = UNKNOWN["unknown_affine"]
     values = np.zeros((3, 4))
     values[:, 0] = [0.1, -0.2, 0.3]
-    twists = function.contribute(case.motion, values.ravel()).twists
+    twists = function.contribute(problem.motion, values.ravel()).twists
     np.testing.assert_allclose(twists[:, 0], np.tile([0.1, -0.2, 0.3, 0.0, 0.0, 0.0], (len(twists), 1)))
-    still = robot_of().positions(case.motion)[0]
-    moved = robot_of((_Constant(Contribution(twists)),)).positions(case.motion)[0]
+    still = robot_of().positions(problem.motion)[0]
+    moved = robot_of((_Constant(Contribution(twists)),)).positions(problem.motion)[0]
     np.testing.assert_allclose(moved - still, np.tile([0.1, -0.2, 0.3], (len(still), 1)), atol=1e-9)
 
 
@@ -87,8 +87,8 @@ def test_functions_of_a_drive_are_as_large_as_its_unit_allows():
 
 def test_functions_of_what_does_not_vary_or_is_unknown_are_left_out():
     frame = measure()
-    assert set(UNKNOWN) <= set(case_of(frame).library) and not set(UNKNOWN) & set(case_of(frame).effects)
-    bare = make_case(frame.assign(time_s=np.nan, payload_kg=2.0), MODEL, MASSES, NOISE_MM, {})
+    assert set(UNKNOWN) <= set(problem_of(frame).library) and not set(UNKNOWN) & set(problem_of(frame).effects)
+    bare = make_diagnosis_problem(frame.assign(time_s=np.nan, payload_kg=2.0), MODEL, MASSES, NOISE_MM, {})
     assert set(bare.library) == {"unknown_drive", "unknown_affine", "unknown_place"}
 
 

@@ -20,13 +20,13 @@ WAVES = np.array([[4e-4, 0.0], [0.0, 5e-4], [2e-4, -3e-4], [0.0, 0.0], [-3e-4, 1
 
 @pytest.fixture(scope="module")
 def found():
-    """The table of a fit to an arm with eccentric encoders, and the case."""
+    """The table of a fit to an arm with eccentric encoders, and the problem."""
     name = "encoder_eccentricity"
-    case = arms.case_of(arms.measure((arms.active(name, WAVES.ravel()),), count=120), name)
-    scales = 3.0 * case.library[name].coordinates.typical
-    fit = fit_model(case, [calibrate(case)], [EffectTerm(name)], scales)
-    table = drive_functions(SimpleNamespace(case=case, fit=fit), NAMES)
-    return check("gap_drive_functions", table.assign(campaign="made up")), case
+    problem = arms.problem_of(arms.measure((arms.active(name, WAVES.ravel()),), count=120), name)
+    scales = 3.0 * problem.library[name].coordinates.typical
+    fit = fit_model(problem, [calibrate(problem)], [EffectTerm(name)], scales)
+    table = drive_functions(SimpleNamespace(problem=problem, fit=fit), NAMES)
+    return check("gap_drive_functions", table.assign(campaign="made up")), problem
 
 
 def test_the_true_function_of_every_drive_lies_in_its_band(found):
@@ -43,9 +43,9 @@ def test_the_true_function_of_every_drive_lies_in_its_band(found):
 
 
 def test_it_spans_the_measured_range_and_one_place_of_each_drive_is_the_worst(found):
-    table, case = found
+    table, problem = found
     for number, rows in table.groupby("drive"):
-        measured = case.motion.drive[case.used][:, number - 1]
+        measured = problem.motion.drive[problem.used][:, number - 1]
         assert rows["drive_value"].min() == measured.min() and rows["drive_value"].max() == measured.max()
         worst = rows[rows["worst"]]
         assert len(worst) == 1 and worst["error"].abs().iloc[0] == rows["error"].abs().max()
@@ -53,18 +53,18 @@ def test_it_spans_the_measured_range_and_one_place_of_each_drive_is_the_worst(fo
 
 
 def test_an_effect_that_is_no_function_of_a_drive_s_value_has_no_rows():
-    case = arms.case_of(arms.measure(count=60), "drive_compliance")
+    problem = arms.problem_of(arms.measure(count=60), "drive_compliance")
     fit = SimpleNamespace(terms=[EffectTerm("drive_compliance")])
-    assert drive_functions(SimpleNamespace(case=case, fit=fit), NAMES).empty
+    assert drive_functions(SimpleNamespace(problem=problem, fit=fit), NAMES).empty
 
 
 def test_a_function_of_many_coefficients_is_what_steps_of_each_of_them_give():
     name = "drive_error_function"
-    case = arms.case_of(arms.measure(count=60), name)
-    fit = fit_model(case, [calibrate(case)], [EffectTerm(name)], 3.0 * case.library[name].coordinates.typical)
-    table = drive_functions(SimpleNamespace(case=case, fit=fit), NAMES)
-    stepped = replace(case, library={name: replace(case.library[name], along_drives=None)})
-    again = drive_functions(SimpleNamespace(case=stepped, fit=fit), NAMES)
+    problem = arms.problem_of(arms.measure(count=60), name)
+    fit = fit_model(problem, [calibrate(problem)], [EffectTerm(name)], 3.0 * problem.library[name].coordinates.typical)
+    table = drive_functions(SimpleNamespace(problem=problem, fit=fit), NAMES)
+    stepped = replace(problem, library={name: replace(problem.library[name], along_drives=None)})
+    again = drive_functions(SimpleNamespace(problem=stepped, fit=fit), NAMES)
     for column in ("error", "low_95", "high_95"):
         np.testing.assert_allclose(table[column], again[column], rtol=0.0, atol=1e-9)
     assert set(table["drive"]) == {1, 2, 3, 4, 5, 6} and (table["high_95"] > table["low_95"]).all()

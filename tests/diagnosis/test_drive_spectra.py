@@ -17,11 +17,11 @@ _COUNT = 150
 
 @pytest.fixture(scope="module")
 def arm():
-    """Case, basis (m, b) of its calibration, effect of the drives (m, 3, K), their values (m, K), of a perfect arm."""
-    case = arms.case_of(arms.measure(count=_COUNT))
-    linear = case.linearise(calibrate(case))
+    """Problem, basis (m, b) of its calibration, effect of drives (m, 3, K), their values (m, K), of a perfect arm."""
+    problem = arms.problem_of(arms.measure(count=_COUNT))
+    linear = problem.linearise(calibrate(problem))
     basis, _ = np.linalg.qr(linear.base.reshape(linear.data.size, -1))
-    return case, basis, linear.drive, case.motion.drive[case.at]
+    return problem, basis, linear.drive, problem.motion.drive[problem.at]
 
 
 def _made(arm, waves, generator, noise_mm=NOISE_MM):
@@ -134,8 +134,8 @@ def test_a_drive_that_stands_still_hides_no_wave_of_another(arm):
 def test_the_spectrum_that_made_the_data_is_the_likeliest():
     """Coefficients drawn from each spectrum, unlike sizes, in noise: most draws name it, all have what it adds."""
     effect = find("drive_error_function", arms.ARM)
-    case = replace(arms.case_of(arms.measure(count=300)), library={effect.name: effect})
-    linear = case.linearise(calibrate(case))
+    problem = replace(arms.problem_of(arms.measure(count=300)), library={effect.name: effect})
+    linear = problem.linearise(calibrate(problem))
     basis, _ = np.linalg.qr(linear.base.reshape(linear.data.size, -1))
     whole, count = linear.columns[effect.name, 0].reshape(linear.data.size, -1), 2 * len(ORDERS)
     # low orders of two drives do, and are quick
@@ -162,10 +162,10 @@ def test_the_spectrum_that_made_the_data_is_the_likeliest():
 def test_one_drive_alone_has_the_size_that_it_has():
     """A rough function of one of six drives: the size is not the mean over six."""
     effect = find("drive_error_function", arms.ARM)
-    case = arms.case_of(arms.measure(count=200), "drive_error_function")
-    linear = case.linearise(calibrate(case))
+    problem = arms.problem_of(arms.measure(count=200), "drive_error_function")
+    linear = problem.linearise(calibrate(problem))
     basis, _ = np.linalg.qr(linear.base.reshape(linear.data.size, -1))
-    found = case.library[effect.name]
+    found = problem.library[effect.name]
     columns, roots = linear.columns[effect.name, 0].reshape(linear.data.size, -1), found.coordinates.roots
     spectra, generator, factors = (roots, found.coordinates.of_one), np.random.default_rng(8), []
     for _ in range(8):
@@ -184,13 +184,13 @@ def test_an_injected_wave_has_its_amplitude():
     effect = find("transmission_orders", arms.ARM).with_waves(((1, 11.0), (3, 30.0)))
     sine, cosine = np.array([2.4e-4, -5e-4]), np.array([-1e-4, 3e-4])
     acting = arms.active("", np.stack([sine, cosine], axis=1).ravel(), {}, effect)
-    case = arms.case_of(arms.measure((acting,)))
-    state = calibrate(case)
+    problem = arms.problem_of(arms.measure((acting,)))
+    state = calibrate(problem)
     for k, (drive, order) in enumerate(((1, 11.0), (3, 30.0))):
         size = np.hypot(sine[k], cosine[k])
-        found = amplitudes(case, state, np.array([order, order + 9.0]))[drive]
+        found = amplitudes(problem, state, np.array([order, order + 9.0]))[drive]
         assert found[0] == pytest.approx(size, rel=0.2) and found[1] < 0.4 * size
-    quiet = arms.case_of(arms.measure())
+    quiet = arms.problem_of(arms.measure())
     for drive in range(6):
         assert (amplitudes(quiet, calibrate(quiet), np.arange(3.0, 60.0))[drive] < 4e-5).all()
 
@@ -199,6 +199,6 @@ def test_amplitudes_are_exact_where_nothing_else_acts():
     """Without noise, of a small wave: the calibration fitted with it does not change it."""
     effect = find("transmission_orders", arms.ARM).with_waves(((2, 4.5),))
     acting = arms.active("", [3e-5, -4e-5], {}, effect)
-    case = arms.case_of(arms.measure((acting,), noise=(0.0, 0.0)))
-    found = amplitudes(case, calibrate(case), np.array([4.5]))[2]
+    problem = arms.problem_of(arms.measure((acting,), noise=(0.0, 0.0)))
+    found = amplitudes(problem, calibrate(problem), np.array([4.5]))[2]
     np.testing.assert_allclose(found, 5e-5, rtol=2e-3)

@@ -7,7 +7,7 @@ from rrru.diagnosis.calibrate import calibrate
 from rrru.diagnosis.drive_spectra import periodogram, resolution, with_orders
 from rrru.diagnosis.settings import GapSettings
 from rrru.effects.protocol import ActiveEffect
-from tests.diagnosis.campaigns import EFFECTS, NOISE_MM, ROBOT, case_of, diagnosed, measure, strong
+from tests.diagnosis.campaigns import EFFECTS, NOISE_MM, ROBOT, diagnosed, measure, problem_of, strong
 
 _GEAR = EFFECTS["transmission_error"]
 
@@ -28,16 +28,16 @@ def _squares(columns, data):
 
 @pytest.mark.parametrize("order", [4.2, 11.0, 60.5])
 def test_the_periodogram_is_what_waves_take_off_the_sum_of_squares(order):
-    case = case_of(measure((_geared(order, 1),)))
-    linear = case.linearise(calibrate(case))
-    drive = case.motion.drive[case.at]
+    problem = problem_of(measure((_geared(order, 1),)))
+    linear = problem.linearise(calibrate(problem))
+    drive = problem.motion.drive[problem.at]
     own = [linear.drive[..., k] * wave(order * drive[:, k])[:, None] for k in range(3) for wave in (np.sin, np.cos)]
     together = np.concatenate([linear.base, np.stack(own, axis=-1)], axis=-1)
     gain = _squares(linear.base, linear.data) - _squares(together, linear.data)
     found = periodogram(linear.data, linear.drive, drive, linear.base, np.array([order]))
     np.testing.assert_allclose(found, gain, rtol=1e-6)
     # waves of this order alone are there: they take all but the noise
-    assert gain > 0.9 * (_squares(linear.base, linear.data) - 3.0 * len(case) * NOISE_MM**2)
+    assert gain > 0.9 * (_squares(linear.base, linear.data) - 3.0 * len(problem) * NOISE_MM**2)
 
 
 def test_a_turn_resolves_whole_orders():
@@ -50,10 +50,10 @@ def test_a_turn_resolves_whole_orders():
 def test_a_ratio_that_is_not_stated_is_found(ratio, seed):
     result = diagnosed(measure((_geared(ratio, seed),), seed=seed))
     assert result.verdict["effects"] == "transmission_error"
-    case = result.inference.case
+    problem = result.inference.problem
     ((key, _),) = result.state.effects.items()
-    found = result.state.shape(case.library, key)["ratio"]
-    assert abs(found - ratio) < 0.15 * resolution(case.motion.drive[case.used])
+    found = result.state.shape(problem.library, key)["ratio"]
+    assert abs(found - ratio) < 0.15 * resolution(problem.motion.drive[problem.used])
 
 
 def test_a_ratio_is_found_together_with_another_effect():
@@ -66,20 +66,20 @@ def test_a_known_ratio_is_not_searched():
     library = settings.library(ROBOT)
     coordinates = library["transmission_error"].coordinates
     assert coordinates.searched is None and coordinates.doubt == 0.0 and coordinates.shapes == ({"ratio": 30.0},)
-    case = case_of(measure((_geared(12.0, 5),)), library)
-    same, added = with_orders(case, case.linearise(calibrate(case)), ())
+    problem = problem_of(measure((_geared(12.0, 5),)), library)
+    same, added = with_orders(problem, problem.linearise(calibrate(problem)), ())
     assert not added and same.library["transmission_error"] is library["transmission_error"]
 
 
 def test_the_stated_ratio_keeps_half_of_the_belief_and_orders_that_stand_out_are_added_once():
-    case = case_of(measure((_geared(12.0, 5),)))
-    linear = case.linearise(calibrate(case))
-    case, added = with_orders(case, linear, ())
-    coordinates = case.library["transmission_error"].coordinates
+    problem = problem_of(measure((_geared(12.0, 5),)))
+    linear = problem.linearise(calibrate(problem))
+    problem, added = with_orders(problem, linear, ())
+    coordinates = problem.library["transmission_error"].coordinates
     assert coordinates.shapes[0] == {"ratio": 50.0} and coordinates.weights[0] == 0.5
     assert added == [("transmission_error", k) for k in range(1, len(coordinates.shapes))]
     assert min(abs(shape["ratio"] - 12.0) for shape in coordinates.shapes) < 0.3
     # what is believed of all orders together is no more than the other half
     assert sum(coordinates.weights[1:]) < 0.5
-    again, added = with_orders(case, linear, ())
+    again, added = with_orders(problem, linear, ())
     assert not added and again.library["transmission_error"].coordinates.shapes == coordinates.shapes

@@ -28,10 +28,10 @@ from tests.diagnosis.campaigns import (
     MODEL,
     NOISE_MM,
     SPIRAL,
-    case_of,
     diagnosed,
     measure,
     plan_of,
+    problem_of,
     strong,
 )
 
@@ -40,10 +40,10 @@ PRIOR_SCALES = [1.0, 3.0]
 
 
 def _setting(passes, effects=()):
-    case = case_of(
+    problem = problem_of(
         measure(effects, plan=plan_of(passes)), {name: EFFECTS[name] for name in ("servo_lag", "leg_asymmetry")}
     )
-    return HeldOut(case, case.evidence(case.linearise(calibrate(case))))
+    return HeldOut(problem, problem.evidence(problem.linearise(calibrate(problem))))
 
 
 @pytest.fixture(scope="module")
@@ -53,17 +53,17 @@ def full():
 
 def _refitted(held_out, level, smooth):
     """Residuals and covariances of predictions of each fold by a dense fit of all others."""
-    case, evidence, fold = held_out.case, held_out.evidence, held_out.fold
-    linear, n = evidence.linear, len(case)
+    problem, evidence, fold = held_out.problem, held_out.evidence, held_out.fold
+    linear, n = evidence.linear, len(problem)
     columns = np.concatenate(
         [linear.base, linear.columns["servo_lag", 0][..., 1:2], linear.columns["leg_asymmetry", 0]], axis=-1
     )
     prior = np.concatenate([np.zeros(7), evidence.scales(TERMS, PRIOR_SCALES) ** -2.0])
-    weight = np.eye(n) / (case.noise_mm**2 * (1.0 + DISCREPANCY_SCALES[level] ** 2))
+    weight = np.eye(n) / (problem.noise_mm**2 * (1.0 + DISCREPANCY_SCALES[level] ** 2))
     if smooth:
         transform, wave = np.zeros((n, n)), np.zeros(n)
-        for run in np.unique(case.run):
-            rows = np.flatnonzero(case.run == run)
+        for run in np.unique(problem.run):
+            rows = np.flatnonzero(problem.run == run)
             transform[np.ix_(rows, rows)], wave[rows] = (
                 dct(np.eye(len(rows)), axis=0, norm="ortho"),
                 np.arange(len(rows)),
@@ -71,7 +71,7 @@ def _refitted(held_out, level, smooth):
         density = 1.0 / (1.0 + (wave / 3.0) ** 2) + 0.01
         weight = (
             transform.T
-            @ np.diag(1.0 / (case.noise_mm**2 * (1.0 + DISCREPANCY_SCALES[level] ** 2 * density / density.mean())))
+            @ np.diag(1.0 / (problem.noise_mm**2 * (1.0 + DISCREPANCY_SCALES[level] ** 2 * density / density.mean())))
             @ transform
         )
     residual, uncertain = np.empty((n, 3)), np.empty(n)
@@ -105,11 +105,11 @@ def test_what_an_effect_gains_is_what_its_prediction_alone_loses(full, level):
 
 
 def test_folds_are_runs_where_every_trajectory_was_driven_twice_else_stretches(full):
-    assert [len(np.unique(full.case.run[full.fold == k])) for k in np.unique(full.fold)] == [1] * 16
+    assert [len(np.unique(full.problem.run[full.fold == k])) for k in np.unique(full.fold)] == [1] * 16
     once = _setting((FORWARD, FORWARD | {"reverse": True, "trajectories": ["line_1"]}))
     assert np.unique(once.fold).tolist() == [0, 1, 2, 3, 4]
-    for run in np.unique(once.case.run):
-        own = once.fold[once.case.run == run]
+    for run in np.unique(once.problem.run):
+        own = once.fold[once.problem.run == run]
         assert [len(piece) for piece in np.split(own, np.flatnonzero(np.diff(own)) + 1)][:-1] == [5] * (
             (len(own) - 1) // 5
         )
@@ -119,11 +119,11 @@ def test_errors_of_predictions_by_a_true_effect_are_noise_and_their_own_uncertai
     found = full.predict((EffectTerm("leg_asymmetry"),), [3.0], 0)
     expected = 3.0 * NOISE_MM**2 + found.uncertainty_mm2
     ratio = ((found.residual_mm**2).sum(axis=1) / expected).mean()
-    assert ratio == pytest.approx(1.0, abs=4.0 * np.sqrt(2.0 / (3.0 * len(full.case))))
+    assert ratio == pytest.approx(1.0, abs=4.0 * np.sqrt(2.0 / (3.0 * len(full.problem))))
 
 
 def _of_runs(run):
-    """What is asked of a case whose points were driven in runs (n,)."""
+    """What is asked of a problem whose points were driven in runs (n,)."""
     return SimpleNamespace(run=run, stop=np.arange(len(run)))
 
 
@@ -150,8 +150,8 @@ def test_the_share_closed_holds_on_other_trajectories(name):
     """Against the truth on runs that the diagnosis has never seen."""
     effect = strong(name, 5.0)
     found = diagnosed(measure((effect,)))
-    case = case_of(measure((effect,), 0.0, plan=plan_of(FULL, OTHER)))
-    before, after = case.residual(found.inference.calibrated), case.residual(found.state)
+    problem = problem_of(measure((effect,), 0.0, plan=plan_of(FULL, OTHER)))
+    before, after = problem.residual(found.inference.calibrated), problem.residual(found.state)
     true = 1.0 - (after**2).sum() / (before**2).sum()
     assert found.verdict["share_closed"] == pytest.approx(true, abs=0.03)
     assert found.verdict["share_closed_low"] <= found.verdict["share_closed"] <= found.verdict["share_closed_high"]
@@ -179,9 +179,9 @@ def test_the_explained_fraction_is_the_reduction_of_the_mean_square_everywhere()
 
 @pytest.mark.parametrize("name", [None, "thermal_growth", "leg_asymmetry", "servo_lag"])
 def test_the_noise_is_found_within_its_error_whatever_smooth_gap_there_is(name):
-    case = case_of(measure((strong(name, 6.0),) if name else ()))
-    estimated, source = with_noise(case, case.linearise(calibrate(case)), None)
-    upper = sum(np.count_nonzero(case.run == run) // 2 for run in np.unique(case.run))
+    problem = problem_of(measure((strong(name, 6.0),) if name else ()))
+    estimated, source = with_noise(problem, problem.linearise(calibrate(problem)), None)
+    upper = sum(np.count_nonzero(problem.run == run) // 2 for run in np.unique(problem.run))
     assert source == "fitted"
     assert np.sqrt((estimated.noise.axis_mm**2).mean()) == pytest.approx(NOISE_MM, rel=4.0 / np.sqrt(6.0 * upper))
 
@@ -202,25 +202,25 @@ def test_repeats_give_the_noise_where_they_are_clearly_quieter():
     jagged = np.random.default_rng(3).normal(0.0, 0.3, (16, 3))
     for k, axis in enumerate("xyz"):
         frame[f"measured_{axis}_mm"] += np.tile(jagged[:, k], 6)
-    case = case_of(frame, {"servo_lag": EFFECTS["servo_lag"]})
-    estimated, source = with_noise(case, case.linearise(calibrate(case)), None)
+    problem = problem_of(frame, {"servo_lag": EFFECTS["servo_lag"]})
+    estimated, source = with_noise(problem, problem.linearise(calibrate(problem)), None)
     assert source == "repeats" and estimated.noise_mm == pytest.approx(NOISE_MM, rel=0.2)
 
 
 def test_single_spikes_are_isolated_and_smooth_gaps_and_noise_are_not(full):
-    case, generator = full.case, np.random.default_rng(2)
-    noise = NOISE_MM * generator.standard_normal((len(case), 3))
-    assert not isolated(noise, case.run, NOISE_MM).any()
-    smooth = 2.0 * np.sin(case.motion.time_s[case.used] / 3.0)[:, None] * [1.0, -0.5, 0.2]
-    wave = 0.3 * np.sin(np.arange(len(case)) / 4.0)[:, None] * [1.0, -0.5, 0.2]
-    assert not isolated(wave + noise, case.run, NOISE_MM).any()
-    assert not isolated(smooth * 0.05 + noise, case.run, NOISE_MM).any()
+    problem, generator = full.problem, np.random.default_rng(2)
+    noise = NOISE_MM * generator.standard_normal((len(problem), 3))
+    assert not isolated(noise, problem.run, NOISE_MM).any()
+    smooth = 2.0 * np.sin(problem.motion.time_s[problem.used] / 3.0)[:, None] * [1.0, -0.5, 0.2]
+    wave = 0.3 * np.sin(np.arange(len(problem)) / 4.0)[:, None] * [1.0, -0.5, 0.2]
+    assert not isolated(wave + noise, problem.run, NOISE_MM).any()
+    assert not isolated(smooth * 0.05 + noise, problem.run, NOISE_MM).any()
     spiked = noise.copy()
     at = [4, 40, 100, 200]
     spiked[at, [0, 1, 2, 0]] += [1.0, -1.0, 0.5, 0.6]
-    assert np.flatnonzero(isolated(spiked, case.run, NOISE_MM)).tolist() == at
-    frequent = noise + 5.0 * (generator.random((len(case), 1)) < 0.3)
-    assert not isolated(frequent, case.run, NOISE_MM).any()
+    assert np.flatnonzero(isolated(spiked, problem.run, NOISE_MM)).tolist() == at
+    frequent = noise + 5.0 * (generator.random((len(problem), 1)) < 0.3)
+    assert not isolated(frequent, problem.run, NOISE_MM).any()
 
 
 def test_the_score_of_a_prediction_is_a_normal_density():

@@ -5,7 +5,7 @@ import pandas as pd
 
 from rrru.campaign import measurements as rows
 from rrru.diagnosis.result_tables import left_out, left_out_note
-from tests.diagnosis.campaigns import case_of, measure
+from tests.diagnosis.campaigns import measure, problem_of
 from tests.schemas import check
 
 
@@ -18,24 +18,24 @@ def test_every_point_that_is_not_used_counts_once_under_its_reason():
     frame.loc[[9, 50, 51, 52], "measured_y_mm"] = np.nan
     frame = rows.hold_out(frame, np.arange(len(frame)) % 40 == 20)
     frame.loc[60:64, "status"] = "near_singularity"
-    case = case_of(frame)
-    dropped = np.zeros(len(case), dtype=bool)
+    problem = problem_of(frame)
+    dropped = np.zeros(len(problem), dtype=bool)
     dropped[[0, 5]] = True
-    case = case.without(dropped)
+    problem = problem.without(dropped)
     held = int((frame["status"] == rows.HELD_OUT).sum())
     expected = {"not measured": 4, "stale reading": 1, "outlier in the file": 2}
     expected |= {"held out for a test": held, "outlier to the diagnosis": 2}
-    found = check("gap_left_out", left_out(case, True).assign(campaign="made up"))
+    found = check("gap_left_out", left_out(problem, True).assign(campaign="made up"))
     assert found.set_index("reason")["points"].to_dict() == expected
-    assert found["points"].sum() == len(frame) - case.count
-    said = left_out_note(left_out(case, True), case.count, len(frame))
-    assert said.startswith(f"{case.count} of {len(frame)} points used; left out: 4 not measured, 1 stale reading, ")
+    assert found["points"].sum() == len(frame) - problem.count
+    said = left_out_note(left_out(problem, True), problem.count, len(frame))
+    assert said.startswith(f"{problem.count} of {len(frame)} points used; left out: 4 not measured, 1 stale reading, ")
 
 
 def test_points_near_singularities_are_left_out_where_that_was_asked_for():
     frame = measure()
     frame.loc[60:64, "status"] = "near_singularity"
-    case = case_of(frame)
-    some = case.without(np.isin(case.at, np.arange(60, 65)))
+    problem = problem_of(frame)
+    some = problem.without(np.isin(problem.at, np.arange(60, 65)))
     assert left_out(some, False).to_dict("records") == [{"reason": "near a singularity", "points": 5}]
-    assert left_out(case, True).empty and isinstance(left_out(case, True), pd.DataFrame)
+    assert left_out(problem, True).empty and isinstance(left_out(problem, True), pd.DataFrame)

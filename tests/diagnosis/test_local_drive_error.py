@@ -68,9 +68,9 @@ def test_a_local_error_of_one_encoder_is_its_error_function(measured):
     assert found.verdict["leg"] == _LEG + 1
     assert found.verdict["gap_after_rms_mm"] < 0.4 * found.verdict["gap_rms_mm"]
     # the function of that drive is the hill, up to a constant and a slope, which a length and others absorb
-    case, state = found.inference.case, found.state
-    effect, values = case.library["drive_error_function"], state.effects["drive_error_function", 0]
-    functions = enumerate(effect.along_drives(case.motion), 1)
+    problem, state = found.inference.problem, found.state
+    effect, values = problem.library["drive_error_function"], state.effects["drive_error_function", 0]
+    functions = enumerate(effect.along_drives(problem.motion), 1)
     made = [own @ values[effect.coordinates.legs == drive] for drive, own in functions]
     lengths = frame[robot.parts.columns[_LEG]].to_numpy()
     line = np.stack([np.ones(_COUNT), lengths], axis=1)

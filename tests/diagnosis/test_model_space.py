@@ -17,16 +17,16 @@ from rrru.diagnosis.terms import EffectTerm, variants
 from rrru.diagnosis.whitened import DISCREPANCY_SCALES
 from rrru.effects.library import find
 from rrru.robots.rrru3 import Rrru3
-from tests.diagnosis.campaigns import EFFECTS, case_of, measure, strong
+from tests.diagnosis.campaigns import EFFECTS, measure, problem_of, strong
 
 # assembly errors that stand in for each other, and some that do not
 FEW = ("axis_tilt", "base_placement", "joint_axis_error", "frame_misregistration", "servo_lag")
 
 
 def _evidence(acting, names=FEW):
-    case = case_of(measure(acting), {name: find(name, Rrru3()) for name in names})
-    library = {name: effect for name, effect in case.library.items() if name not in UNKNOWN}
-    evidence = case.evidence(case.linearise(calibrate(case)))
+    problem = problem_of(measure(acting), {name: find(name, Rrru3()) for name in names})
+    library = {name: effect for name, effect in problem.library.items() if name not in UNKNOWN}
+    evidence = problem.evidence(problem.linearise(calibrate(problem)))
     return evidence, library
 
 

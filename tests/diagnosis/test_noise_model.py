@@ -12,7 +12,7 @@ from rrru.diagnosis.calibrate import calibrate
 from rrru.diagnosis.diagnose import MeasuredRobot, diagnose, with_wide_bounds
 from rrru.diagnosis.drive_spectra import with_orders
 from rrru.diagnosis.inference import with_noise
-from rrru.diagnosis.make_problem import make_case
+from rrru.diagnosis.make_problem import make_diagnosis_problem
 from rrru.diagnosis.settings import GapSettings
 from rrru.diagnosis.whitened import spectrum
 from rrru.estimation.noise_model import NoiseModel, fit_noise, half_waves, lengths
@@ -121,11 +121,11 @@ def _noise_of_arm(seed, stated_mm=None):
     frame = arms.measure((), count=60, seed=seed)
     frame = frame.drop(columns=[name for name in frame if name.startswith("measured_r")])
     robot = with_wide_bounds(arms.reading(frame))
-    case = make_case(frame, robot, arms.MASSES, arms.NOISE_MM, GapSettings().library(robot))
-    linear = case.linearise(calibrate(case))
-    case, orders = with_orders(case, linear, ())
-    linear = replace(linear, columns=linear.columns | case.linearise(calibrate(case), orders).columns)
-    found, _ = with_noise(case, linear, stated_mm)
+    problem = make_diagnosis_problem(frame, robot, arms.MASSES, arms.NOISE_MM, GapSettings().library(robot))
+    linear = problem.linearise(calibrate(problem))
+    problem, orders = with_orders(problem, linear, ())
+    linear = replace(linear, columns=linear.columns | problem.linearise(calibrate(problem), orders).columns)
+    found, _ = with_noise(problem, linear, stated_mm)
     return found.noise_mm / arms.NOISE_MM
 
 

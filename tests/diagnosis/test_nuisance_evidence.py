@@ -72,11 +72,11 @@ def test_the_same_seed_gives_the_same_numbers():
 def _evidence(robot):
     """Evidence of a robot whose drives are soft."""
     if robot == "3-RRRU":
-        case = campaigns.case_of(campaigns.measure((campaigns.strong("drive_compliance", 3.0, 1),)))
+        problem = campaigns.problem_of(campaigns.measure((campaigns.strong("drive_compliance", 3.0, 1),)))
     else:
         soft = arms.active("drive_compliance", [1e-9, 2e-9, 1e-9, 0.0, 1e-9, 0.0])
-        case = arms.case_of(arms.measure((soft,), 60), "backlash", "drive_compliance")
-    return case.evidence(case.linearise(calibrate(case)))
+        problem = arms.problem_of(arms.measure((soft,), 60), "backlash", "drive_compliance")
+    return problem.evidence(problem.linearise(calibrate(problem)))
 
 
 @pytest.mark.parametrize("robot", ["3-RRRU", "arm"])

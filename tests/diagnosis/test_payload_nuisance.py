@@ -59,7 +59,7 @@ def test_the_campaign_driven_once_more_is_worth_as_much_again(misled):
     *_, inference = misled
     nothing = replace(inference.hypothesis, terms=(), prior_scales=np.zeros((len(DISCREPANCY_SCALES), 0)))
     answers = (inference.hypothesis, inference.level), (nothing, inference.level)
-    now, runs = worth(inference, *answers, inference.case)
+    now, runs = worth(inference, *answers, inference.problem)
     assert (sum(runs[1:], now + runs[0])).nats() == pytest.approx(2.0 * now.nats(), rel=1e-3)
 
 

@@ -10,135 +10,135 @@ import pytest
 from rrru.campaign import measurements as rows
 from rrru.campaign.driven_path import starts_of_runs
 from rrru.diagnosis.calibrate import calibrate
-from rrru.diagnosis.state import State
+from rrru.diagnosis.state import ModelState
 from rrru.errors import FitError
 from tests.diagnosis import campaigns
-from tests.diagnosis.campaigns import EFFECTS, MODEL, ROBOT, active, case_of, drawn, measure, plan_of, robot_of
+from tests.diagnosis.campaigns import EFFECTS, MODEL, ROBOT, active, drawn, measure, plan_of, problem_of, robot_of
 
 STATE_ERRORS = np.array([2e-3, -1e-3, 1.5e-3, 0.4, -0.3, 0.5, 0.2])
 
 
-def _exact(case, state):
+def _exact(problem, state):
     """Positions (n, 3) of the exact closure with a state's effects, none included."""
-    return case.mechanism.measured(*case.posed(state))[case.used]
+    return problem.mechanism.measured(*problem.posed(state))[problem.used]
 
 
 @pytest.fixture(scope="module")
-def case():
-    return case_of(measure())
+def problem():
+    return problem_of(measure())
 
 
-def test_points_that_are_known_are_used_and_no_run_begins_with_a_known_approach(case):
-    starts = starts_of_runs(case.measurements["run"].to_numpy())
-    assert case.used.all() and set(case.known) == {"backlash", "friction_windup"}
-    assert not case.known["backlash"][starts].any() and 0.7 < case.known["backlash"].mean() < 1.0
-    np.testing.assert_array_equal(case.known["backlash"], np.isnan(case.motion.approach).all(axis=1))
-    assert len(case) == case.used.sum() == len(case.points) == len(case.run) == case.count
-    some = case.at_complete({"backlash", "servo_lag"})
-    np.testing.assert_array_equal(some.used, case.known["backlash"])
-    assert case.at_complete({"servo_lag"}) is case
+def test_points_that_are_known_are_used_and_no_run_begins_with_a_known_approach(problem):
+    starts = starts_of_runs(problem.measurements["run"].to_numpy())
+    assert problem.used.all() and set(problem.known) == {"backlash", "friction_windup"}
+    assert not problem.known["backlash"][starts].any() and 0.7 < problem.known["backlash"].mean() < 1.0
+    np.testing.assert_array_equal(problem.known["backlash"], np.isnan(problem.motion.approach).all(axis=1))
+    assert len(problem) == problem.used.sum() == len(problem.points) == len(problem.run) == problem.count
+    some = problem.at_complete({"backlash", "servo_lag"})
+    np.testing.assert_array_equal(some.used, problem.known["backlash"])
+    assert problem.at_complete({"servo_lag"}) is problem
 
 
 def test_points_that_are_lost_or_marked_are_not_used():
     frame = measure()
     frame.loc[[3, 40], "status"] = ["outlier", "unsolved"]
     frame.loc[50, "measured_y_mm"] = np.nan
-    used = case_of(frame).used
+    used = problem_of(frame).used
     assert not used[[3, 40, 50]].any() and used[[2, 41, 51]].all()
     frame.loc[60:70, "status"] = "near_singularity"
-    assert case_of(frame).used[60:71].all() and case_of(frame).used.sum() == len(frame) - 3
+    assert problem_of(frame).used[60:71].all() and problem_of(frame).used.sum() == len(frame) - 3
 
 
-def test_points_dropped_later_stay_dropped(case):
-    flagged = np.zeros(len(case), dtype=bool)
+def test_points_dropped_later_stay_dropped(problem):
+    flagged = np.zeros(len(problem), dtype=bool)
     flagged[[0, 5]] = True
-    smaller = case.without(flagged)
-    np.testing.assert_array_equal(rows.measured(smaller.points), rows.measured(case.points)[~flagged])
-    assert len(smaller) == len(case) - 2 and len(smaller.without(np.zeros(len(smaller), dtype=bool))) == len(smaller)
+    smaller = problem.without(flagged)
+    np.testing.assert_array_equal(rows.measured(smaller.points), rows.measured(problem.points)[~flagged])
+    assert len(smaller) == len(problem) - 2 and len(smaller.without(np.zeros(len(smaller), dtype=bool))) == len(smaller)
 
 
-def test_the_motion_read_from_the_columns_is_the_one_that_was_driven(case):
+def test_the_motion_read_from_the_columns_is_the_one_that_was_driven(problem):
     """Rates, loads and drive path of the table against those of the plan, which knows them in closed form; away from a
     run's ends.
     """
     driven = robot_of().motion(plan_of(), ROBOT.inverse)
-    inner = case.used & np.append(~starts_of_runs(case.measurements["run"].to_numpy())[1:], False)
+    inner = problem.used & np.append(~starts_of_runs(problem.measurements["run"].to_numpy())[1:], False)
     for name, share in (("drive_rate", 0.04), ("drive_load", 0.01), ("force_n", 0.01), ("held_force_n", 0.01)):
-        found, true = getattr(case.motion, name)[inner], getattr(driven, name)[inner]
+        found, true = getattr(problem.motion, name)[inner], getattr(driven, name)[inner]
         assert np.sqrt(((found - true) ** 2).mean()) < share * np.sqrt((true**2).mean()), name
-    np.testing.assert_allclose(case.motion.path_drive[case.motion.path_index], case.motion.drive)
-    assert np.isfinite(case.motion.path_drive).all()
+    np.testing.assert_allclose(problem.motion.path_drive[problem.motion.path_index], problem.motion.drive)
+    assert np.isfinite(problem.motion.path_drive).all()
     for leg in range(3):
         low, high = driven.path_drive[:, leg].min(), driven.path_drive[:, leg].max()
-        assert case.motion.path_drive[:, leg].min() == pytest.approx(low, abs=2e-3)
-        assert case.motion.path_drive[:, leg].max() == pytest.approx(high, abs=2e-3)
+        assert problem.motion.path_drive[:, leg].min() == pytest.approx(low, abs=2e-3)
+        assert problem.motion.path_drive[:, leg].max() == pytest.approx(high, abs=2e-3)
 
 
 def _state(name, shape, seed=3, size=1.0):
-    return State(STATE_ERRORS, {(name, shape): size * drawn(name, seed)})
+    return ModelState(STATE_ERRORS, {(name, shape): size * drawn(name, seed)})
 
 
 @pytest.mark.parametrize("name", EFFECTS)
-def test_the_corrected_model_is_the_virtual_robot_with_the_same_numbers(case, name):
+def test_the_corrected_model_is_the_virtual_robot_with_the_same_numbers(problem, name):
     """On the same motion to the solver's accuracy, on the motion as driven up to what the columns do not determine."""
     shape = len(EFFECTS[name].coordinates.shapes) - 1
     state = _state(name, shape)
     robot = robot_of((active(name, state.effects[name, shape], shape),))
-    found = _exact(case, state)
-    same, _ = robot.positions(case.motion, rows.command(case.measurements))
-    np.testing.assert_allclose(found, same[case.used], atol=1e-7)
+    found = _exact(problem, state)
+    same, _ = robot.positions(problem.motion, rows.command(problem.measurements))
+    np.testing.assert_allclose(found, same[problem.used], atol=1e-7)
     driven, _ = robot.positions(robot.motion(plan_of(), ROBOT.inverse), plan_of().targets())
-    size = np.sqrt(((found - case.model_positions(STATE_ERRORS)[case.used]) ** 2).mean())
-    assert size > 0.0 and np.median(np.abs(found - driven[case.used])) < 0.03 * size
+    size = np.sqrt(((found - problem.model_positions(STATE_ERRORS)[problem.used]) ** 2).mean())
+    assert size > 0.0 and np.median(np.abs(found - driven[problem.used])) < 0.03 * size
 
 
-def test_without_effects_the_corrected_model_is_the_calibrated_one(case):
+def test_without_effects_the_corrected_model_is_the_calibrated_one(problem):
     np.testing.assert_allclose(
-        _exact(case, State(STATE_ERRORS, {})), case.model_positions(STATE_ERRORS)[case.used], atol=1e-7
+        _exact(problem, ModelState(STATE_ERRORS, {})), problem.model_positions(STATE_ERRORS)[problem.used], atol=1e-7
     )
 
 
 @pytest.mark.parametrize("name", EFFECTS)
-def test_signatures_are_secants_of_the_exact_model(case, name):
+def test_signatures_are_secants_of_the_exact_model(problem, name):
     """Every coordinate of every shape, over its typical size, to first order in the closure."""
-    effect, plain = EFFECTS[name], State(STATE_ERRORS, {})
-    linear, still = case.linearise(plain), _exact(case, plain)
+    effect, plain = EFFECTS[name], ModelState(STATE_ERRORS, {})
+    linear, still = problem.linearise(plain), _exact(problem, plain)
     for shape in range(len(effect.coordinates.shapes)):
         for k, typical in enumerate(effect.coordinates.typical):
             step = np.zeros(len(effect.coordinates))
             step[k] = typical
-            slope = (_exact(case, State(STATE_ERRORS, {(name, shape): step})) - still) / typical
+            slope = (_exact(problem, ModelState(STATE_ERRORS, {(name, shape): step})) - still) / typical
             off = np.abs(linear.columns[name, shape][..., k] - slope).max() * typical
             # some axes of a joint do nothing to first order
             least = 1e-4 if name == "joint_axis_error" else 0.0
             assert off < max(0.01 * np.abs(slope).max() * typical, least), (shape, k)
 
 
-def test_the_calibrations_columns_are_derivatives_of_the_model(case):
-    base = case.linearise(State(STATE_ERRORS, {})).base
+def test_the_calibrations_columns_are_derivatives_of_the_model(problem):
+    base = problem.linearise(ModelState(STATE_ERRORS, {})).base
     for k, step in enumerate([1e-5] * 3 + [1e-2] * 4):
         change = np.eye(7)[k] * step
-        slope = (case.model_positions(STATE_ERRORS + change) - case.model_positions(STATE_ERRORS - change))[
-            case.used
+        slope = (problem.model_positions(STATE_ERRORS + change) - problem.model_positions(STATE_ERRORS - change))[
+            problem.used
         ] / (2.0 * step)
         np.testing.assert_allclose(base[..., k], slope, atol=1e-5 * max(np.abs(slope).max(), 1.0))
 
 
-def test_the_derivative_by_the_drives_is_the_mechanisms(case):
-    linear = case.linearise(State(STATE_ERRORS, {}))
-    theta, position = rows.actuators(case.measurements, MODEL), case.model_positions(STATE_ERRORS)
+def test_the_derivative_by_the_drives_is_the_mechanisms(problem):
+    linear = problem.linearise(ModelState(STATE_ERRORS, {}))
+    theta, position = rows.actuators(problem.measurements, MODEL), problem.model_positions(STATE_ERRORS)
     np.testing.assert_allclose(
-        linear.drive, MODEL.actuator_jacobian(position, theta, STATE_ERRORS)[case.used], rtol=1e-8
+        linear.drive, MODEL.actuator_jacobian(position, theta, STATE_ERRORS)[problem.used], rtol=1e-8
     )
 
 
 @pytest.mark.parametrize("name", ["servo_lag", "leg_asymmetry", "joint_clearance", "thermal_growth"])
-def test_the_data_about_a_state_are_what_it_leaves_and_what_it_explains(case, name):
+def test_the_data_about_a_state_are_what_it_leaves_and_what_it_explains(problem, name):
     """So that the state's own coordinates give back the exact model's residual."""
     state = _state(name, 1 if len(EFFECTS[name].coordinates.shapes) > 1 else 0, size=4.0)
-    linear = case.linearise(state)
+    linear = problem.linearise(state)
     (key, coordinates), *_ = state.effects.items()
-    np.testing.assert_allclose(linear.data - linear.columns[key] @ coordinates, case.residual(state), atol=1e-9)
+    np.testing.assert_allclose(linear.data - linear.columns[key] @ coordinates, problem.residual(state), atol=1e-9)
     steps = {step[0] for step in linear.shape_steps[name]}
     assert steps <= set(EFFECTS[name].coordinates.shapes[0])
     assert (
@@ -147,13 +147,13 @@ def test_the_data_about_a_state_are_what_it_leaves_and_what_it_explains(case, na
     )
 
 
-def test_stepping_a_shape_parameter_is_what_the_last_column_says(case):
+def test_stepping_a_shape_parameter_is_what_the_last_column_says(problem):
     state = _state("thermal_growth", 2, size=4.0)
-    linear = case.linearise(state)
+    linear = problem.linearise(state)
     (name, value, stepped), *_ = linear.shape_steps["thermal_growth"]
     assert name == "time_constant" and stepped != value
     other = replace(state, shape_values={"thermal_growth": {name: stepped}})
-    change = _exact(case, other) - _exact(case, state)
+    change = _exact(problem, other) - _exact(problem, state)
     np.testing.assert_allclose(
         linear.shape_columns["thermal_growth"][..., -1], change, atol=0.02 * np.abs(change).max()
     )
@@ -166,27 +166,30 @@ def test_what_the_columns_do_not_determine_is_not_tested():
         ("payload_kg", set()),
         ("speed_mm_s", set()),
     ):
-        case = case_of(frame.assign(**{column: np.nan}))
-        assert set(case.untestable) & set(EFFECTS) == lost and set(case.library) & set(EFFECTS) == set(EFFECTS) - lost
-        assert all(note.startswith("needs ") for note in case.untestable.values())
+        problem = problem_of(frame.assign(**{column: np.nan}))
+        assert (
+            set(problem.untestable) & set(EFFECTS) == lost
+            and set(problem.library) & set(EFFECTS) == set(EFFECTS) - lost
+        )
+        assert all(note.startswith("needs ") for note in problem.untestable.values())
 
 
 def test_times_that_are_all_alike_determine_nothing():
-    case = case_of(measure().assign(time_s=5.0))
-    assert {"thermal_growth", "servo_lag", "base_drift"} == set(case.untestable) & set(EFFECTS)
-    assert case.untestable["thermal_growth"] == "needs time_s of more than one value"
+    problem = problem_of(measure().assign(time_s=5.0))
+    assert {"thermal_growth", "servo_lag", "base_drift"} == set(problem.untestable) & set(EFFECTS)
+    assert problem.untestable["thermal_growth"] == "needs time_s of more than one value"
 
 
 def test_a_calibration_without_noise_finds_the_robots_errors():
-    found = calibrate(case_of(measure(noise_mm=0.0)))
+    found = calibrate(problem_of(measure(noise_mm=0.0)))
     np.testing.assert_allclose(found.deviations, STATE_ERRORS, atol=1e-6)
     assert found.effects == {}
 
 
-def test_a_model_without_a_pose_is_an_error_that_says_so(case):
-    lost = State(STATE_ERRORS, {("leg_asymmetry", 0): np.tile([0.0, 0.0, -700.0], 3)})
+def test_a_model_without_a_pose_is_an_error_that_says_so(problem):
+    lost = ModelState(STATE_ERRORS, {("leg_asymmetry", 0): np.tile([0.0, 0.0, -700.0], 3)})
     with pytest.raises(FitError, match="has no pose at"):
-        case.linearise(lost)
+        problem.linearise(lost)
 
 
 def test_campaigns_are_as_strong_as_they_say():
@@ -195,6 +198,6 @@ def test_campaigns_are_as_strong_as_they_say():
 
 
 def test_a_state_has_a_shape_that_was_searched_without_a_library_that_lists_it():
-    state = State(np.zeros(1), {("transmission_error", 7): np.zeros(6)}, {"transmission_error": {"ratio": 4.2}})
+    state = ModelState(np.zeros(1), {("transmission_error", 7): np.zeros(6)}, {"transmission_error": {"ratio": 4.2}})
     assert state.shape(EFFECTS, ("transmission_error", 7)) == {"ratio": 4.2}
     assert state.shape(EFFECTS, ("transmission_error", 0)) == {"ratio": 50.0}

@@ -33,7 +33,7 @@ def _attribution(make, seed=0, count=240):
     response = 200.0 * np.broadcast_to(np.linalg.inv(mixed), (count, 3, 3)) * (1.0 + 0.2 * along[:, None, None])
     left = make(motion, response) + NOISE_MM * generator.standard_normal((count, 3))
     run = np.repeat(np.arange(count // 20), 20)
-    case = SimpleNamespace(
+    problem = SimpleNamespace(
         motion=motion,
         at=np.arange(count),
         on_robot=np.ones(count, dtype=bool),
@@ -47,7 +47,7 @@ def _attribution(make, seed=0, count=240):
     # three offsets of all positions are the calibration
     base = np.broadcast_to(np.eye(3), (count, 3, 3))
     evidence = SimpleNamespace(linear=SimpleNamespace(drive=response, base=base))
-    return SimpleNamespace(case=case, evidence=evidence, state=None)
+    return SimpleNamespace(problem=problem, evidence=evidence, state=None)
 
 
 _MADE = {
@@ -104,7 +104,7 @@ def test_the_evidence_is_that_of_the_dense_normal_density():
 def test_effects_that_make_what_the_variable_makes_are_found():
     """A slow drift follows the time as the remainder does; waves of a drive and effects of other needs do not."""
     found = _attribution(_MADE["the time"], 1)
-    motion = found.case.motion
+    motion = found.problem.motion
     made = {
         ("drift", 0): (motion.time_s / motion.time_s.max())[:, None, None] * np.ones((1, 3, 1)),
         ("waves", 0): np.sin(60.0 * motion.drive[:, :1])[:, :, None] * np.ones((1, 3, 1)),
@@ -112,7 +112,7 @@ def test_effects_that_make_what_the_variable_makes_are_found():
         ("shake", 0): np.sin(motion.time_s)[:, None, None] * np.ones((1, 3, 1)),
     }
     needs = {"drift": ("time_s",), "waves": (), "bend": (), "shake": ("time_s",)}
-    found.case.effects = {name: SimpleNamespace(needs=own) for name, own in needs.items()}
+    found.problem.effects = {name: SimpleNamespace(needs=own) for name, own in needs.items()}
     found.evidence.linear.columns = made
     found.state = SimpleNamespace(effects={key: np.ones(1) for key in made})
     rows = remainder_rows(found)

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from rrru.campaign import measurements as rows
 from rrru.diagnosis.calibrate import calibrate
 from rrru.diagnosis.diagnose import MeasuredRobot, with_wide_bounds
-from rrru.diagnosis.make_problem import make_case
+from rrru.diagnosis.make_problem import make_diagnosis_problem
 from rrru.diagnosis.model_fit import fit_model
 from rrru.diagnosis.result_notes import noise_notes, payload_notes, undetermined_payload_notes, zero_notes
 from rrru.diagnosis.terms import EffectTerm
@@ -38,7 +38,7 @@ def _arm(generator):
 
 
 def _measured(robot, errors, generator, place_mm=None, known=True):
-    """The case of 90 poses in which the tool was read, or a target at a place; known: of which the place is stated."""
+    """The problem of 90 poses where the tool was read, or a target at a place; known: whether the place is stated."""
     driven = generator.uniform(-1.4, 1.4, (90, 7))
     command = robot.forward(driven)
     twists = robot.twists_of(errors)
@@ -54,12 +54,12 @@ def _measured(robot, errors, generator, place_mm=None, known=True):
     frame = frame.assign(**drives, **rows.vector_columns("command", command), **rows.vector_columns("measured", seen))
     robot = robot.reading(rows.reads(frame, () if known is False else ("ball",)))
     robot = robot.seen_at(driven, command, rows.readings(frame, robot.angle_arm_mm))
-    return make_case(frame, with_wide_bounds(robot), Masses(0.0, 0.0, 0.0), _NOISE_MM, {})
+    return make_diagnosis_problem(frame, with_wide_bounds(robot), Masses(0.0, 0.0, 0.0), _NOISE_MM, {})
 
 
-def _zeros(case):
+def _zeros(problem):
     """Notes on zeros of a calibration."""
-    return list(zero_notes(fit_model(case, [calibrate(case)]).estimate, case.mechanism))
+    return list(zero_notes(fit_model(problem, [calibrate(problem)]).estimate, problem.mechanism))
 
 
 @pytest.mark.parametrize("seed", range(6))
@@ -91,9 +91,9 @@ def test_the_zero_of_the_last_joint_is_confounded_with_the_place_of_a_target(kno
     generator = np.random.default_rng(8)
     robot = _arm(generator)
     place, off = np.array([70.0, -30.0, 60.0]), Rotation.from_rotvec([0.0, 0.0, 0.05]).as_matrix()
-    case = _measured(robot, {"dq3": 0.02}, generator, off @ place, known)
-    stated = case.measurements.assign(**rows.vector_columns("target", np.tile(place, (90, 1))))
-    notes = _zeros(replace(case, measurements=stated))
+    problem = _measured(robot, {"dq3": 0.02}, generator, off @ place, known)
+    stated = problem.measurements.assign(**rows.vector_columns("target", np.tile(place, (90, 1))))
+    notes = _zeros(replace(problem, measurements=stated))
     (last,) = (note for note in notes if note.startswith("joint 7"))
     assert "zero and the place of the target are not separately identifiable" in last
     (third,) = (note for note in notes if note.startswith("joint 3"))
@@ -104,14 +104,14 @@ def test_a_zero_confounded_with_a_link_is_said_to_be_most_probable_only():
     """As where poses hardly separate a zero from a shift of the next joint, which the prior holds to 10 mm."""
     generator = np.random.default_rng(3)
     robot = _arm(generator)
-    case = _measured(robot, {"dq3": 0.2}, generator)
-    estimate, names = fit_model(case, [calibrate(case)]).estimate, case.mechanism.parameters.names
-    assert _ZERO.match(next(note for note in zero_notes(estimate, case.mechanism) if note.startswith("joint 3")))
+    problem = _measured(robot, {"dq3": 0.2}, generator)
+    estimate, names = fit_model(problem, [calibrate(problem)]).estimate, problem.mechanism.parameters.names
+    assert _ZERO.match(next(note for note in zero_notes(estimate, problem.mechanism) if note.startswith("joint 3")))
     zero, shift = names.index("dq3"), next(k for k, sd in enumerate(estimate.parameters.sd) if sd == 10.0)
     direction = np.zeros(len(names))
     direction[[zero, shift]] = 0.02, 10.0
     unsure = replace(estimate, covariance=estimate.covariance + np.outer(direction, direction))
-    (note,) = (note for note in zero_notes(unsure, case.mechanism) if note.startswith("joint 3"))
+    (note,) = (note for note in zero_notes(unsure, problem.mechanism) if note.startswith("joint 3"))
     assert "zero is not determined by the readings, its most probable offset is 11.5 degrees (95 %: 9.2" in note
 
 
@@ -121,10 +121,10 @@ def _weighed(passes, stated_kg):
     library = {name: campaigns.EFFECTS[name]}
     frame = campaigns.measure((campaigns.strong(name, 30.0),), plan=campaigns.plan_of(passes))
     masses = replace(campaigns.MASSES, platform_kg=stated_kg)
-    case = make_case(frame, campaigns.MODEL, masses, campaigns.NOISE_MM, library)
+    problem = make_diagnosis_problem(frame, campaigns.MODEL, masses, campaigns.NOISE_MM, library)
     sizes = 20.0 * np.asarray(library[name].coordinates.typical)
-    fit = fit_model(case, [calibrate(case)], [EffectTerm(name)], sizes)
-    found = SimpleNamespace(case=case, fit=fit)
+    fit = fit_model(problem, [calibrate(problem)], [EffectTerm(name)], sizes)
+    found = SimpleNamespace(problem=problem, fit=fit)
     return fit.weight, list(payload_notes(found)), list(undetermined_payload_notes(found))
 
 

@@ -60,7 +60,7 @@ def test_a_gear_error_of_a_ratio_that_is_not_stated_is_named_together_with_a_sli
         assert numbers[f"amplitude{drive}"] == pytest.approx(true[f"amplitude{drive}"], rel=0.15)
     assert not {"amplitude3", "phase3"} & set(numbers.index)
     # a slide has no such error
-    motion = found.inference.case.motion
+    motion = found.inference.problem.motion
     effect, robot = find("transmission_error", known.mechanism), known.mechanism
     change = effect.contribute(motion, effect.parameters.vector(true))
     turned = robot.drive_errors(np.broadcast_to(change.twists, (len(motion), *change.twists.shape[1:])))

@@ -22,7 +22,7 @@ from rrru.diagnosis.inference import InferenceResult, fit_hypothesis, infer
 from rrru.diagnosis.model_fit import fit_model
 from rrru.diagnosis.model_space import explore
 from rrru.diagnosis.settings import Prior
-from rrru.diagnosis.state import State
+from rrru.diagnosis.state import ModelState
 from rrru.diagnosis.terms import EffectTerm, spread, variants
 from rrru.diagnosis.verdict import Group, decide
 from rrru.diagnosis.whitened import DISCREPANCY_SCALES
@@ -36,10 +36,10 @@ from tests.diagnosis.campaigns import (
     MASSES,
     REVERSE,
     active,
-    case_of,
     drawn,
     measure,
     plan_of,
+    problem_of,
     strong,
 )
 
@@ -57,8 +57,8 @@ def _score(evidence, terms):
 
 @pytest.mark.parametrize("acting", [(), ("servo_lag",), ("leg_asymmetry", "backlash")])
 def test_the_search_finds_what_an_enumeration_of_all_sets_finds(acting):
-    case = case_of(measure(tuple(strong(name, 4.0) for name in acting)), _library(*FEW))
-    evidence = case.evidence(case.linearise(calibrate(case)))
+    problem = problem_of(measure(tuple(strong(name, 4.0) for name in acting)), _library(*FEW))
+    evidence = problem.evidence(problem.linearise(calibrate(problem)))
     found = explore(evidence, Prior()).hypotheses
     choices = {name: variants(EFFECTS[name]) for name in FEW}
     for size in range(3):
@@ -72,8 +72,8 @@ def test_the_search_finds_what_an_enumeration_of_all_sets_finds(acting):
 
 @pytest.mark.parametrize("count", [2, 3])
 def test_prior_scales_averaged_one_by_one_are_near_the_average_over_all_combinations(count):
-    case = case_of(measure((strong("servo_lag", 6.0), strong("backlash", 3.0))), _library(*FEW))
-    evidence = case.evidence(case.linearise(calibrate(case)))
+    problem = problem_of(measure((strong("servo_lag", 6.0), strong("backlash", 3.0))), _library(*FEW))
+    evidence = problem.evidence(problem.linearise(calibrate(problem)))
     terms = tuple(EffectTerm(name) for name in FEW[-count:])
     for level in (0, 2, 4):
         one_by_one, best = evidence.over_all_strengths(terms, level)
@@ -84,24 +84,24 @@ def test_prior_scales_averaged_one_by_one_are_near_the_average_over_all_combinat
 
 def test_five_effects_at_once_are_all_found():
     names = ("leg_asymmetry", "servo_lag", "backlash", "thermal_growth", "encoder_eccentricity")
-    case = case_of(measure(tuple(strong(name, 8.0) for name in names)), EFFECTS)
-    found = infer(case, Prior())
+    problem = problem_of(measure(tuple(strong(name, 8.0) for name in names)), EFFECTS)
+    found = infer(problem, Prior())
     assert found.hypothesis.effects == set(names)
     assert min(found.posterior.marginal(name) for name in names) > 0.99
     assert sum(p for (effects, flag), p in found.posterior.sets().items() if not flag and effects == set(names)) > 0.5
 
 
 def test_every_effect_alone_is_always_weighed():
-    case = case_of(measure())
-    evidence = case.evidence(case.linearise(calibrate(case)))
+    problem = problem_of(measure())
+    evidence = problem.evidence(problem.linearise(calibrate(problem)))
     single = {h.terms[0] for h in explore(evidence, Prior()).hypotheses if len(h.terms) == 1}
     assert single >= {term for effect in EFFECTS.values() for term in variants(effect)}
 
 
-def _fitted(case, start, *terms):
+def _fitted(problem, start, *terms):
     """ModelFit of a hypothesis from a start."""
-    evidence = case.evidence(case.linearise(calibrate(case)))
-    return fit_hypothesis(case, evidence, (start,), (_hypothesis(*terms), 0))
+    evidence = problem.evidence(problem.linearise(calibrate(problem)))
+    return fit_hypothesis(problem, evidence, (start,), (_hypothesis(*terms), 0))
 
 
 def _hypothesis(*terms):
@@ -112,11 +112,11 @@ def _hypothesis(*terms):
 @pytest.mark.parametrize("name", ["backlash", "servo_lag", "axis_tilt", "joint_clearance", "encoder_eccentricity"])
 def test_the_exact_fit_finds_the_truth_without_noise(name):
     truth = 3.0 * drawn(name, 7)
-    case = case_of(measure((active(name, truth),), 0.0), _library(name))
-    start = calibrate(case)
-    fit = _fitted(case, start, EffectTerm(name))
+    problem = problem_of(measure((active(name, truth),), 0.0), _library(name))
+    start = calibrate(problem)
+    fit = _fitted(problem, start, EffectTerm(name))
     state, (shapes, covariance) = fit.state, fit.effect_covariance(EffectTerm(name))
-    before, after = np.abs(case.residual(start)), np.abs(case.residual(state))
+    before, after = np.abs(problem.residual(start)), np.abs(problem.residual(state))
     # in the mean the few points matter at which a hard contact has just changed sides
     assert np.median(after) < 0.03 * np.median(before) and covariance.shape == (len(truth) + len(shapes),) * 2
     # the motion read from the columns is not quite the one driven
@@ -126,24 +126,24 @@ def test_the_exact_fit_finds_the_truth_without_noise(name):
 def test_the_exact_fit_finds_a_time_constant_between_those_tried():
     effect = EFFECTS["thermal_growth"]
     true = replace(active("thermal_growth", [8e-4]), values={"strain": 8e-4, "time_constant": 380.0})
-    case = case_of(measure((true,)), {"thermal_growth": effect})
+    problem = problem_of(measure((true,)), {"thermal_growth": effect})
     shape = next(k for k, shape in enumerate(effect.coordinates.shapes) if shape["time_constant"] == 250.0)
-    state = _fitted(case, calibrate(case), EffectTerm("thermal_growth", shape)).state
+    state = _fitted(problem, calibrate(problem), EffectTerm("thermal_growth", shape)).state
     assert state.shape_values["thermal_growth"]["time_constant"] == pytest.approx(380.0, rel=0.1)
     assert state.effects["thermal_growth", shape][0] == pytest.approx(8e-4, rel=0.05)
 
 
 def test_an_exact_fit_from_another_fit_keeps_what_both_share():
     both = (strong("servo_lag", 4.0), strong("leg_asymmetry", 4.0))
-    case = case_of(measure(both), _library("servo_lag", "leg_asymmetry"))
-    one = _fitted(case, calibrate(case), EffectTerm("servo_lag")).state
-    fit = _fitted(case, one, EffectTerm("servo_lag"), EffectTerm("leg_asymmetry"))
+    problem = problem_of(measure(both), _library("servo_lag", "leg_asymmetry"))
+    one = _fitted(problem, calibrate(problem), EffectTerm("servo_lag")).state
+    fit = _fitted(problem, one, EffectTerm("servo_lag"), EffectTerm("leg_asymmetry"))
     two, covariance = fit.state, fit.effect_covariance(EffectTerm("servo_lag"))[1]
-    direct = _fitted(case, calibrate(case), EffectTerm("servo_lag"), EffectTerm("leg_asymmetry")).state
+    direct = _fitted(problem, calibrate(problem), EffectTerm("servo_lag"), EffectTerm("leg_asymmetry")).state
     error = np.sqrt(np.diag(covariance)[:3])
     assert (np.abs(two.effects["servo_lag", 0] - direct.effects["servo_lag", 0]) < error).all()
-    left = np.sqrt((case.residual(two) ** 2).mean())
-    assert left == pytest.approx(case.noise_mm, rel=0.1)
+    left = np.sqrt((problem.residual(two) ** 2).mean())
+    assert left == pytest.approx(problem.noise_mm, rel=0.1)
 
 
 TWINS = frozenset({"drive_compliance", "own_weight"})
@@ -171,13 +171,13 @@ def twins():
     """InferenceResult, about the calibration alone, of a campaign without payloads between two effects that differ
     under payload only.
     """
-    case, calibrated = _twins()
-    evidence = case.evidence(case.linearise(calibrated))
+    problem, calibrated = _twins()
+    evidence = problem.evidence(problem.linearise(calibrated))
     posterior = explore(evidence, Prior())
     found = InferenceResult(
-        case, calibrated, calibrated, fit_model(case, [calibrated]), evidence, posterior, *posterior.best()
+        problem, calibrated, calibrated, fit_model(problem, [calibrated]), evidence, posterior, *posterior.best()
     )
-    verdict = decide(posterior, case.library)
+    verdict = decide(posterior, problem.library)
     return found, verdict, advise(found, verdict, MASSES).runs
 
 
@@ -185,8 +185,8 @@ def _twins():
     library = _library("drive_compliance", "servo_lag", "thermal_growth", "transmission_error") | {
         "own_weight": FakeCompliance()
     }
-    case = case_of(measure((strong("drive_compliance", 6.0),), plan=plan_of((FORWARD, REVERSE))), library)
-    return case, calibrate(case)
+    problem = problem_of(measure((strong("drive_compliance", 6.0),), plan=plan_of((FORWARD, REVERSE))), library)
+    return problem, calibrate(problem)
 
 
 def test_what_no_run_separates_shares_the_probability(twins):
@@ -239,15 +239,15 @@ def test_the_best_runs_gain_is_what_appending_it_brings(twins):
     squares.
     """
     found, verdict, table = twins
-    best, case = table.iloc[0], found.case
-    frame = case.measurements
+    best, problem = table.iloc[0], found.problem
+    frame = problem.measurements
     first = frame[(frame["trajectory"] == best["trajectory"])]
     first = first[first["run"] == first["run"].iloc[0]]
     first = first.iloc[::-1].assign(time_s=lambda f: first["time_s"].max() - f["time_s"]) if best["reverse"] else first
     extra = first.assign(run=99, payload_kg=best["payload_kg"], speed_mm_s=best["speed_mm_s"])
     clock = (extra["time_s"] - extra["time_s"].iloc[0]) * first["speed_mm_s"].iloc[0] / best["speed_mm_s"]
     extra = extra.assign(time_s=clock + frame["time_s"].max() + 60.0)
-    longer = case_of(pd.concat([frame, extra], ignore_index=True), case.library)
+    longer = problem_of(pd.concat([frame, extra], ignore_index=True), problem.library)
     tail = longer.run == 99
     favoured = found.posterior.best_of(frozenset(verdict.effects))
     own, other = best["separates"].split(" / ")
@@ -260,17 +260,20 @@ def test_the_best_runs_gain_is_what_appending_it_brings(twins):
     keys = [(term.effect, term.shape) for term in (*favoured[0].terms, *rival[0].terms)]
     new = longer.linearise(found.calibrated, keys)
     mean, _ = found.evidence.coefficients(favoured[0].terms, favoured[0].prior_scales[favoured[1]], favoured[1])
-    size = _columns(case.library, new, favoured[0]).shape[-1] - 7
+    size = _columns(problem.library, new, favoured[0]).shape[-1] - 7
     prior = found.evidence.scales(rival[0].terms, rival[0].prior_scales[rival[1]])
     costs = []
     for rows in (np.zeros(len(tail), dtype=bool), tail):
         made = [
-            _columns(case.library, found.evidence.linear, favoured[0])[..., 7:],
-            _columns(case.library, new, favoured[0])[rows][..., 7:],
+            _columns(problem.library, found.evidence.linear, favoured[0])[..., 7:],
+            _columns(problem.library, new, favoured[0])[rows][..., 7:],
         ]
-        design = [_columns(case.library, found.evidence.linear, rival[0]), _columns(case.library, new, rival[0])[rows]]
-        target = np.concatenate([m.reshape(-1, size) for m in made]) @ mean[:size] / case.noise_mm
-        matrix = np.concatenate([d.reshape(-1, d.shape[-1]) for d in design]) / case.noise_mm
+        design = [
+            _columns(problem.library, found.evidence.linear, rival[0]),
+            _columns(problem.library, new, rival[0])[rows],
+        ]
+        target = np.concatenate([m.reshape(-1, size) for m in made]) @ mean[:size] / problem.noise_mm
+        matrix = np.concatenate([d.reshape(-1, d.shape[-1]) for d in design]) / problem.noise_mm
         penalty = np.concatenate([np.zeros((len(prior), 7)), np.diag(1.0 / prior)], axis=1)
         matrix, target = np.concatenate([matrix, penalty]), np.concatenate([target, np.zeros(len(prior))])
         unit = np.linalg.norm(matrix, axis=0)
@@ -283,15 +286,15 @@ def test_the_best_runs_gain_is_what_appending_it_brings(twins):
 
 def test_nothing_is_advised_where_nothing_rivals():
     found = infer(
-        case_of(
+        problem_of(
             measure((strong("frame_misregistration", 10.0),), plan=plan_of(FULL)), _library("frame_misregistration")
         ),
         Prior(),
     )
-    verdict = decide(found.posterior, found.case.effects)
+    verdict = decide(found.posterior, found.problem.effects)
     assert verdict.label == "frame_misregistration"
     assert advise(found, replace(verdict, rivals=()), MASSES) is NOTHING
-    assert isinstance(found.state, State) and found.dropped == 0
+    assert isinstance(found.state, ModelState) and found.dropped == 0
 
 
 def test_what_a_run_adds_is_the_ratio_of_the_predictive_densities_of_its_readings(twins):
@@ -299,20 +302,20 @@ def test_what_a_run_adds_is_the_ratio_of_the_predictive_densities_of_its_reading
     found, verdict, _ = twins
     names = frozenset(verdict.effects)
     answers = found.posterior.best_of(names), found.posterior.best_of(TWINS - names)
-    case = found.case
+    problem = found.problem
     added = realized(found, *answers)
-    assert set(added) == set(case.run.tolist())
-    run = case.run[-1]
-    here, logs = case.run == run, []
+    assert set(added) == set(problem.run.tolist())
+    run = problem.run[-1]
+    here, logs = problem.run == run, []
     keys = [(term.effect, term.shape) for hypothesis, _ in answers for term in hypothesis.terms]
-    linear = case.linearise(found.state, keys)
+    linear = problem.linearise(found.state, keys)
     for hypothesis, level in answers:
-        design = _columns(case.library, linear, hypothesis) / case.noise_mm
+        design = _columns(problem.library, linear, hypothesis) / problem.noise_mm
         sd = found.evidence.scales(hypothesis.terms, hypothesis.prior_scales[level])
         unit = np.concatenate([np.linalg.norm(design[~here][..., :7], axis=(0, 1)) ** -1.0, sd])
         penalty = np.diag(np.concatenate([np.zeros(7), np.ones(len(sd))]))
         old, new = ((design[rows] * unit).reshape(3 * rows.sum(), -1) for rows in (~here, here))
-        known, data = (linear.data[rows].ravel() / case.noise_mm for rows in (~here, here))
+        known, data = (linear.data[rows].ravel() / problem.noise_mm for rows in (~here, here))
         covariance = np.linalg.inv(old.T @ old + penalty)
         spread_of = np.eye(len(new)) + new @ covariance @ new.T
         logs.append(multivariate_normal(new @ covariance @ old.T @ known, spread_of).logpdf(data))
@@ -323,7 +326,7 @@ def test_what_a_run_adds_is_the_ratio_of_the_predictive_densities_of_its_reading
 def test_a_run_that_did_not_decide_is_not_advised_again(added, share, monkeypatch):
     """Run 3 drives line_1 again; it was expected to add 6 nats: nothing alike is expected of another such run."""
     frame = pd.DataFrame({"run": np.repeat([1, 2, 3], 10), "trajectory": np.repeat(["line_1", "line_2", "line_1"], 10)})
-    inference = SimpleNamespace(case=SimpleNamespace(measurements=frame, used=np.ones(30, dtype=bool)))
+    inference = SimpleNamespace(problem=SimpleNamespace(measurements=frame, used=np.ones(30, dtype=bool)))
     known = {"contest": 0, "points": 10}
     names, gains = (
         ("line_1 once more", "line_1 with 5 kg payload", "line_2 once more", "10 poses"),

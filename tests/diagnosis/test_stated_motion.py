@@ -15,7 +15,7 @@ from rrru.campaign.ingest.spec import IngestSpec
 from rrru.campaign.schemas import measurement_table
 from rrru.diagnosis.approach_direction import paths_between_stops, undetermined_senses
 from rrru.diagnosis.diagnose import MeasuredRobot, diagnose
-from rrru.diagnosis.make_problem import make_case
+from rrru.diagnosis.make_problem import make_diagnosis_problem
 from rrru.effects.library import find
 from rrru.errors import ConfigError
 from rrru.kinematics.dynamics import Masses
@@ -42,17 +42,17 @@ def _read(folder, frame, motion=None):
     return ingest(IngestSpec.from_config(section), _HEXAPOD).measurements
 
 
-def _case(table, *names):
+def _problem(table, *names):
     library = {name: find(name, _HEXAPOD) for name in names}
     robot = as_measured(_HEXAPOD, table, tuple(hexapod_stops.PLACES))
-    return make_case(table, robot, Masses(), hexapod_stops.NOISE_MM, library)
+    return make_diagnosis_problem(table, robot, Masses(), hexapod_stops.NOISE_MM, library)
 
 
-def _changes(case, width_mm=_WIDTH_MM):
-    """Changes (n, 6) of the legs' lengths by backlash along a case's motion."""
-    robot = case.mechanism
+def _changes(problem, width_mm=_WIDTH_MM):
+    """Changes (n, 6) of the legs' lengths by backlash along a problem's motion."""
+    robot = problem.mechanism
     sites = [robot.legs.site_numbers[drive.site] for drive in robot.parts.drives]
-    return find("backlash", robot).contribute(case.motion, np.full(6, width_mm)).twists[:, sites, 0]
+    return find("backlash", robot).contribute(problem.motion, np.full(6, width_mm)).twists[:, sites, 0]
 
 
 def _diagnosed(table):
@@ -83,7 +83,7 @@ def test_backlash_has_its_width_where_the_motion_is_stated(tmp_path, order, betw
 def test_a_way_that_is_not_stated_leaves_open_where_straight_tool_and_straight_drives_differ(tmp_path):
     """What stays known is right whichever way was taken."""
     frame = hexapod_stops.file_of("random", "tool")
-    motion = _case(_read(tmp_path, frame, "stop_and_go")).motion
+    motion = _problem(_read(tmp_path, frame, "stop_and_go")).motion
     known, shares = np.isnan(motion.approach[::2]), []
     for between in ("drives", "tool"):
         commanded, actual, _ = hexapod_stops.reached("random", between, np.full(6, 1e-6))
@@ -99,10 +99,10 @@ def test_a_way_that_is_not_stated_leaves_open_where_straight_tool_and_straight_d
 @pytest.mark.parametrize("between", ["drives", "tool"])
 def test_senses_of_arrival_are_those_of_the_way_that_is_stated(tmp_path, between):
     frame = hexapod_stops.file_of("grid", between)
-    case = _case(_read(tmp_path, frame, {"kind": "stop_and_go", "between": between}))
+    problem = _problem(_read(tmp_path, frame, {"kind": "stop_and_go", "between": between}))
     commanded, actual, _ = hexapod_stops.reached("grid", between, np.full(6, 1e-3))
     expected = np.repeat((commanded - actual) / 0.5e-3, 2, axis=0)
-    sense, known = _changes(case, 1e-3) / -0.5e-3, np.isnan(case.motion.approach)
+    sense, known = _changes(problem, 1e-3) / -0.5e-3, np.isnan(problem.motion.approach)
     assert not known[:2].any() and known[2:].mean() > 0.99
     assert (np.abs(sense - expected)[known] < 0.02).mean() > 0.995
 
@@ -156,16 +156,18 @@ def test_all_readings_at_a_stop_have_its_senses(tmp_path):
     jitter = 2e-3 * np.random.default_rng(2).standard_normal((len(frame), 6))
     jittered = _read(tmp_path, frame.assign(**(frame[hexapod_stops.DRIVES] + jitter)), motion)
     assert stops(jittered.drop(columns=["motion", "motion_between"])).max() == len(frame) - 1
-    alone = _changes(_case(table[::2]))
+    alone = _changes(_problem(table[::2]))
     for other in (table, jittered):
-        case = _case(other)
-        np.testing.assert_array_equal(case.motion.path_index, np.repeat(np.arange(125), 2) * case.motion.path_index[2])
-        np.testing.assert_array_equal(_changes(case)[::2], _changes(case)[1::2])
-        np.testing.assert_allclose(_changes(case)[::2], alone, atol=8e-3)
-        np.testing.assert_array_equal(case.motion.last_move[::2], case.motion.last_move[1::2])
+        problem = _problem(other)
+        np.testing.assert_array_equal(
+            problem.motion.path_index, np.repeat(np.arange(125), 2) * problem.motion.path_index[2]
+        )
+        np.testing.assert_array_equal(_changes(problem)[::2], _changes(problem)[1::2])
+        np.testing.assert_allclose(_changes(problem)[::2], alone, atol=8e-3)
+        np.testing.assert_array_equal(problem.motion.last_move[::2], problem.motion.last_move[1::2])
     # the tool read twice at each stop, without reflectors
     twice = arms.measure(count=20).loc[np.repeat(np.arange(20), 2)].assign(point=np.arange(1, 41))
-    held = make_case(twice.assign(motion="stop_and_go"), arms.ARM, arms.MASSES, 1.0, {}).motion
+    held = make_diagnosis_problem(twice.assign(motion="stop_and_go"), arms.ARM, arms.MASSES, 1.0, {}).motion
     np.testing.assert_array_equal(held.last_move[2::2], held.last_move[3::2])
     assert (held.last_move[2:] != 0.0).any(axis=1).all()
 
@@ -179,7 +181,7 @@ def test_a_robot_that_rests_has_no_speed_and_one_that_does_not_has_one():
         frame = frame.assign(**rows.vector_columns("measured", rows.command(frame)))
         library = {name: find(name, arms.ARM) for name in ("servo_lag", "read_before_rest")}
         rested, passed = (
-            make_case(frame.assign(motion=kind), arms.ARM, arms.MASSES, 1.0, library)
+            make_diagnosis_problem(frame.assign(motion=kind), arms.ARM, arms.MASSES, 1.0, library)
             for kind in ("stop_and_go", "continuous")
         )
         assert not rested.motion.drive_rate.any() and not rested.motion.drive_acceleration.any()
@@ -214,5 +216,5 @@ def test_what_is_stated_is_in_the_tables_of_the_campaign(tmp_path):
 def test_held_out_rows_change_no_sense(tmp_path):
     table = _read(tmp_path, hexapod_stops.file_of("grid", "tool"), {"kind": "stop_and_go", "between": "tool"})
     held = rows.hold_out(table, np.arange(len(table)) % 7 == 0)
-    np.testing.assert_array_equal(_case(held).motion.path_drive, _case(table).motion.path_drive)
-    assert replace(_case(held), known={}).count < len(table)
+    np.testing.assert_array_equal(_problem(held).motion.path_drive, _problem(table).motion.path_drive)
+    assert replace(_problem(held), known={}).count < len(table)

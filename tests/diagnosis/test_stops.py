@@ -8,7 +8,7 @@ from rrru.campaign import measurements as rows
 from rrru.campaign.outliers import isolated
 from rrru.diagnosis.calibrate import calibrate
 from rrru.diagnosis.heldout import HeldOut
-from rrru.diagnosis.make_problem import make_case
+from rrru.diagnosis.make_problem import make_diagnosis_problem
 from rrru.effects.library import find
 from rrru.estimation.noise_model import NoiseModel, alike
 from rrru.kinematics.dynamics import Masses
@@ -105,28 +105,28 @@ def _campaign(scatter_mm, seed=1, turned=False):
     return table.assign(**rows.vector_columns("measured", seen), **places, **names)
 
 
-def _case(table):
+def _problem(table):
     library = {name: find(name, arms.ARM) for name in ("drive_compliance", "encoder_eccentricity")}
-    return make_case(table, arms.reading(table), arms.MASSES, 0.02, library, arm_mm=500.0)
+    return make_diagnosis_problem(table, arms.reading(table), arms.MASSES, 0.02, library, arm_mm=500.0)
 
 
 @pytest.mark.parametrize(("scatter_mm", "share"), [(0.0, 0.0), (0.02, 0.5), (0.06, 0.9)])
 def test_the_scatter_of_an_arm_with_three_reflectors_is_seen(scatter_mm, share):
     found = []
     for seed in range(3):
-        case = _case(_campaign(scatter_mm, seed))
-        linear = case.linearise(calibrate(case))
+        problem = _problem(_campaign(scatter_mm, seed))
+        linear = problem.linearise(calibrate(problem))
         columns = np.concatenate([linear.base, *linear.columns.values()], axis=-1)
-        found.append(alike(linear.data, columns, case.stop, case.kind))
+        found.append(alike(linear.data, columns, problem.stop, problem.kind))
     # numbers that are fitted take more of what is shared than of the rest
     assert np.mean(found) == pytest.approx(1.0 + 2.0 * share, abs=0.2)
 
 
 @pytest.mark.parametrize("turned", [False, True])
 def test_a_fold_holds_all_that_was_read_at_a_stop(turned):
-    case = _case(_campaign(0.0, turned=turned))
-    held_out = HeldOut(case, case.evidence(case.linearise(calibrate(case))))
-    row_stop = case.points["point"].to_numpy() - 1
+    problem = _problem(_campaign(0.0, turned=turned))
+    held_out = HeldOut(problem, problem.evidence(problem.linearise(calibrate(problem))))
+    row_stop = problem.points["point"].to_numpy() - 1
     stop = row_stop // 3
     assert len(stop) == (6 if turned else 3) * _STOPS
     for number in np.unique(stop):
@@ -184,7 +184,7 @@ def test_between_stops_in_no_order_slides_come_from_the_stop_before():
     frame = frame.assign(**command, **dict(zip(gantry.GANTRY.parts.columns, drive.T, strict=True)))
     frame = frame.assign(**dict.fromkeys(("time_s", "speed_mm_s", "payload_kg"), np.nan))
     frame = frame.assign(**rows.vector_columns("measured", rows.command(frame)))
-    motion = make_case(frame, gantry.GANTRY, Masses(0.0, 0.0, 0.0), 0.01, {}).motion
+    motion = make_diagnosis_problem(frame, gantry.GANTRY, Masses(0.0, 0.0, 0.0), 0.01, {}).motion
     effect, width = find("backlash", gantry.GANTRY), 0.02
     made = effect.contribute(motion, np.full(3, width)).twists
     sites = gantry.GANTRY.legs.site_numbers

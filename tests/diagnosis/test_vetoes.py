@@ -16,7 +16,7 @@ from rrru.diagnosis.settings import Prior
 from rrru.diagnosis.state import LinearizedProblem
 from rrru.effects.protocol import Coordinates
 from rrru.estimation.noise_model import NoiseModel
-from tests.diagnosis.campaigns import EFFECTS, case_of, measure, strong
+from tests.diagnosis.campaigns import EFFECTS, measure, problem_of, strong
 
 NOISE_MM, PRIOR = 0.05, Prior()
 
@@ -85,13 +85,15 @@ def test_what_was_ruled_out_before_does_not_come_back():
 def inference():
     """InferenceResult, about the calibration alone, of a campaign in which two effects act for certain."""
     names = ("servo_lag", "leg_asymmetry", "backlash")
-    case = case_of(measure((strong("servo_lag", 8.0), strong("leg_asymmetry", 8.0))), {n: EFFECTS[n] for n in names})
-    calibrated = calibrate(case)
-    evidence = case.evidence(case.linearise(calibrated))
+    problem = problem_of(
+        measure((strong("servo_lag", 8.0), strong("leg_asymmetry", 8.0))), {n: EFFECTS[n] for n in names}
+    )
+    calibrated = calibrate(problem)
+    evidence = problem.evidence(problem.linearise(calibrated))
     decisive = evidence.on_library()
     posterior = explore(decisive, PRIOR)
     return InferenceResult(
-        case, calibrated, calibrated, fit_model(case, [calibrated]), evidence, posterior, *posterior.best()
+        problem, calibrated, calibrated, fit_model(problem, [calibrated]), evidence, posterior, *posterior.best()
     )
 
 

@@ -23,7 +23,7 @@ EFFECT = effects.find("base_drift", arms.ARM)
 
 def _motion(times=_TIMES):
     frame = arms.measure(count=len(times)).assign(time_s=times)
-    return arms.case_of(frame).motion
+    return arms.problem_of(frame).motion
 
 
 def test_it_is_nothing_at_the_start_and_grows_in_proportion_to_the_time():
@@ -69,8 +69,8 @@ def test_reflectors_beside_the_robot_and_on_it_move_alike():
 
 
 def test_a_campaign_without_times_cannot_test_it():
-    case = arms.case_of(arms.measure(count=60), "base_drift", "drive_compliance")
-    assert set(case.effects) == {"drive_compliance"} and "time_s" in case.untestable["base_drift"]
+    problem = arms.problem_of(arms.measure(count=60), "base_drift", "drive_compliance")
+    assert set(problem.effects) == {"drive_compliance"} and "time_s" in problem.untestable["base_drift"]
 
 
 @pytest.mark.parametrize("robot", [Rrru3(), Delta(), arms.ARM], ids=["rrru3", "delta", "arm"])

@@ -7,7 +7,7 @@ import pytest
 
 from rrru.diagnosis.calibrate import calibrate
 from rrru.diagnosis.drive_spectra import resolved
-from rrru.diagnosis.state import State
+from rrru.diagnosis.state import ModelState
 from rrru.effects.drive_error_function import ORDERS
 from rrru.effects.library import find
 from rrru.effects.motion import Course, make_motion
@@ -44,7 +44,7 @@ def frame():
 
 @pytest.fixture(scope="module")
 def motion(frame):
-    return arms.case_of(frame).motion
+    return arms.problem_of(frame).motion
 
 
 def _expected(name, number, drive):
@@ -89,19 +89,19 @@ def test_the_functions_along_the_drives_are_differences_of_what_the_law_contribu
 def test_columns_are_slopes_of_exact_readings(name, frame):
     """Central differences through the exact closure, about the calibrated arm; the generic way gives the same."""
     effect = _law(name)
-    case = arms.case_of(frame, library={name: effect})
+    problem = arms.problem_of(frame, library={name: effect})
     if name == FUNCTION:
-        assert len(case.library[name].coordinates) < len(effect.coordinates)
-        case = replace(case, library={name: effect})
-    state = calibrate(case)
-    columns = case.linearise(state).columns[name, 0]
-    secant = replace(case, library={name: replace(effect, along_drives=None)}).linearise(state).columns[name, 0]
+        assert len(problem.library[name].coordinates) < len(effect.coordinates)
+        problem = replace(problem, library={name: effect})
+    state = calibrate(problem)
+    columns = problem.linearise(state).columns[name, 0]
+    secant = replace(problem, library={name: replace(effect, along_drives=None)}).linearise(state).columns[name, 0]
     # turns by errors and by waves add up as vectors or one after the other
     largest = np.abs(columns).max()
     np.testing.assert_allclose(columns, secant, rtol=0.0, atol=2e-5 * largest)
     for number in _SOME if name == FUNCTION else range(len(effect.coordinates)):
         step = 1e-4 * np.eye(len(effect.coordinates))[number]
-        down, up = (case.residual(State(state.deviations, {(name, 0): sign * step})) for sign in (-1.0, 1.0))
+        down, up = (problem.residual(ModelState(state.deviations, {(name, 0): sign * step})) for sign in (-1.0, 1.0))
         assert np.abs(columns[..., number]).max() > 1.0
         np.testing.assert_allclose(columns[..., number], (down - up) / 2e-4, rtol=0.0, atol=5e-5 * largest)
 

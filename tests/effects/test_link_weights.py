@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rrru.diagnosis.make_problem import make_case
+from rrru.diagnosis.make_problem import make_diagnosis_problem
 from rrru.effects.library import find
 from rrru.kinematics.point_masses import PointMass
 from rrru.robots.rrru3 import Rrru3
@@ -18,7 +18,7 @@ _MASSLESS = replace(arms.ARM, point_masses=())
 def _motion(robot):
     frame = arms.commands(arms.drives(_COUNT, np.random.default_rng(3)))
     frame = frame.assign(payload_kg=0.0, **{f"measured_{axis}_mm": frame[f"command_{axis}_mm"] for axis in "xyz"})
-    return make_case(frame, robot, arms.MASSES, 1.0, {}).motion
+    return make_diagnosis_problem(frame, robot, arms.MASSES, 1.0, {}).motion
 
 
 def test_only_arms_whose_links_have_no_masses_have_the_parameters():

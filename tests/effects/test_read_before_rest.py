@@ -8,7 +8,7 @@ import pytest
 
 from rrru.campaign import measurements as rows
 from rrru.diagnosis.diagnose import MeasuredRobot, diagnose
-from rrru.diagnosis.make_problem import make_case
+from rrru.diagnosis.make_problem import make_diagnosis_problem
 from rrru.diagnosis.settings import GapSettings
 from rrru.effects.library import find
 from rrru.effects.motion import last_move
@@ -54,8 +54,8 @@ def _campaign(count, shares, exponent=0.0, noise_mm=0.02, seed=3):
     )
 
 
-def _case(frame, *names):
-    return make_case(frame, ARM, Masses(), 0.02, {name: find(name, ARM) for name in names})
+def _problem(frame, *names):
+    return make_diagnosis_problem(frame, ARM, Masses(), 0.02, {name: find(name, ARM) for name in names})
 
 
 def test_a_move_is_that_from_the_stop_before_whoever_is_measured_there():
@@ -68,10 +68,10 @@ def test_a_move_is_that_from_the_stop_before_whoever_is_measured_there():
 @pytest.mark.parametrize("exponent", [0.0, 0.5, 1.0])
 def test_the_law_undoes_what_was_read_too_early(exponent):
     frame = _campaign(40, _SHARES, exponent, noise_mm=0.0)
-    case, effect = _case(frame, "read_before_rest"), find("read_before_rest", ARM)
+    problem, effect = _problem(frame, "read_before_rest"), find("read_before_rest", ARM)
     values = effect.parameters.vector(_SHARES | {"exponent": exponent})
-    twists = effect.contribute(case.motion, values).twists
-    off = rows.measured(frame) - ARM.measured(ARM.solve(case.motion.drive, rows.command(frame), twists), twists)
+    twists = effect.contribute(problem.motion, values).twists
+    off = rows.measured(frame) - ARM.measured(ARM.solve(problem.motion.drive, rows.command(frame), twists), twists)
     # of the moves as read, which the shares change by themselves
     assert np.abs(off[1:]).max() < 0.02 * np.abs(rows.measured(frame) - rows.command(frame)).max()
 
@@ -82,10 +82,10 @@ def test_rows_that_are_held_out_stay_stops():
     marked = rows.hold_out(frame.assign(status=np.where(np.arange(40) == 4, "outlier", "ok")), held)
     assert marked["status"].tolist()[:6] == ["ok", "held_out", "ok", "ok", "outlier", "ok"]
     assert not rows.usable(marked)[held].any()
-    whole, part = _case(frame, "read_before_rest"), _case(marked, "read_before_rest")
+    whole, part = _problem(frame, "read_before_rest"), _problem(marked, "read_before_rest")
     np.testing.assert_array_equal(whole.motion.last_move, part.motion.last_move)
     assert not part.used[held].any() and len(part.motion.drive) == 40
-    torn = _case(frame[~held], "read_before_rest")
+    torn = _problem(frame[~held], "read_before_rest")
     assert np.nanmax(np.abs(torn.motion.last_move - whole.motion.last_move[~held])) > 0.1
 
 
@@ -96,8 +96,8 @@ def test_what_is_passed_on_a_path_has_no_last_move():
     line = low + 0.1 + 0.5 * (high - low) * np.linspace(0.0, 1.0, 40)[:, None]
     drives = dict(zip(ARM.parts.columns, line.T, strict=True))
     command = rows.vector_columns("command", ARM.forward(line))
-    case = _case(frame.iloc[order].assign(**drives, **command), "read_before_rest", "drive_compliance")
-    assert "last_move" in case.untestable["read_before_rest"]
+    problem = _problem(frame.iloc[order].assign(**drives, **command), "read_before_rest", "drive_compliance")
+    assert "last_move" in problem.untestable["read_before_rest"]
 
 
 @pytest.mark.parametrize("exponent", [0.0, 1.0])

@@ -16,7 +16,7 @@ EFFECT = effects.find("thermal_expansion", arms.ARM)
 
 def _motion():
     frame = arms.measure(count=len(_TEMPERATURE)).assign(temperature_c=_TEMPERATURE)
-    return arms.case_of(frame).motion
+    return arms.problem_of(frame).motion
 
 
 def test_an_arm_of_one_material_grows_as_a_whole():
@@ -33,11 +33,11 @@ def test_an_arm_of_one_material_grows_as_a_whole():
 
 def test_without_a_temperature_it_says_nothing_and_is_not_tested():
     frame = arms.measure(count=6)
-    motion = arms.case_of(frame).motion
+    motion = arms.problem_of(frame).motion
     assert np.isnan(motion.temperature_c).all()
     assert not EFFECT.contribute(motion, [_EXPANSION]).twists.any()
-    case = arms.case_of(frame, "thermal_expansion")
-    assert "needs temperature_c" in case.untestable["thermal_expansion"]
+    problem = arms.problem_of(frame, "thermal_expansion")
+    assert "needs temperature_c" in problem.untestable["thermal_expansion"]
 
 
 def test_the_coefficient_is_found_from_an_arm_measured_warm_and_cold():
@@ -45,8 +45,8 @@ def test_the_coefficient_is_found_from_an_arm_measured_warm_and_cold():
     temperature = 20.0 + 8.0 * np.sin(np.arange(60.0))
     grown = rows.measured(frame) * (1.0 + _EXPANSION * (temperature - 20.0))[:, None]
     frame = frame.assign(temperature_c=temperature, **rows.vector_columns("measured", grown))
-    case = arms.case_of(frame, "thermal_expansion")
-    fit = fit_named_effects(case, ["thermal_expansion"], calibrate(case))
+    problem = arms.problem_of(frame, "thermal_expansion")
+    fit = fit_named_effects(problem, ["thermal_expansion"], calibrate(problem))
     found, error = fit.state.effects["thermal_expansion", 0][0], fit.estimate.block_errors("thermal_expansion")[0]
     assert error < 0.05 * _EXPANSION
     assert found == pytest.approx(_EXPANSION, abs=4.0 * error)

@@ -10,14 +10,14 @@ from rrru.diagnosis.settings import GapSettings
 from rrru.effects.library import find
 from rrru.effects.protocol import ActiveEffect
 from rrru.kinematics.legs import WORLD
-from tests.diagnosis.campaigns import MASSES, NOISE_MM, ROBOT, case_of, measure
+from tests.diagnosis.campaigns import MASSES, NOISE_MM, ROBOT, measure, problem_of
 
 EFFECT, SCALE = find("tracker_scale", ROBOT), 4e-4
 _LIBRARY = ("tracker_scale", "frame_misregistration", "backlash", "drive_compliance", "servo_lag", "axis_tilt")
 
 
 def test_all_distances_grow_by_one_factor():
-    motion = case_of(measure()).motion
+    motion = problem_of(measure()).motion
     moved = EFFECT.contribute(motion, [SCALE]).twists[:, ROBOT.legs.site_numbers[WORLD]]
     assert not moved[:, 3:].any()
     reported = motion.position_mm + moved[:, :3]

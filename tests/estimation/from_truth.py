@@ -13,9 +13,9 @@ from scipy.spatial.transform import Rotation
 from rrru.campaign import measurements as rows
 from rrru.diagnosis.calibrate import calibrate
 from rrru.diagnosis.diagnose import with_wide_bounds
-from rrru.diagnosis.make_problem import make_case
+from rrru.diagnosis.make_problem import make_diagnosis_problem
 from rrru.diagnosis.model_fit import EffectModel, fit_named_effects
-from rrru.diagnosis.state import State
+from rrru.diagnosis.state import ModelState
 from rrru.errors import FitError
 from rrru.kinematics.base_parameters import open_numbers
 from rrru.kinematics.dynamics import Masses
@@ -65,18 +65,18 @@ def unregistered_table(campaign):
     return table.assign(**labels, **columns, **nothing, **rows.turn_columns("command", poses.turn))
 
 
-def case_of(campaign):
+def problem_of(campaign):
     """The DiagnosisProblem of a RandomCampaign, as of a user's file, without ingest."""
     table = unregistered_table(campaign)
     robot = with_wide_bounds(setup.as_measured(campaign.robot, table, registered=True))
     arm_mm = robot.angle_arm_mm if campaign.turn is not None else np.nan
-    case = make_case(table, robot, _NO_LOADS, NOISE_MM, {}, arm_mm=arm_mm)
-    return replace(case, library={FRAMES: frames(robot)})
+    problem = make_diagnosis_problem(table, robot, _NO_LOADS, NOISE_MM, {}, arm_mm=arm_mm)
+    return replace(problem, library={FRAMES: frames(robot)})
 
 
-def true_deviations(campaign, case):
-    """Deviations (p,) of the case's robot, in the frame and about the places that the case's readings have."""
-    measured = rows.measured(case.measurements)
+def true_deviations(campaign, problem):
+    """Deviations (p,) of the problem's robot, in the frame and about the places that the problem's readings have."""
+    measured = rows.measured(problem.measurements)
     middle, own = campaign.measured_mm.mean(axis=0), measured.mean(axis=0)
     moved, _ = Rotation.align_vectors(measured - own, campaign.measured_mm - middle)
     turn = moved * Rotation.from_rotvec(campaign.frame[3:])
@@ -84,10 +84,10 @@ def true_deviations(campaign, case):
     values = dict(campaign.errors)
     values |= {f"world_{axis}": value for axis, value in zip("xyz", shift, strict=True)}
     values |= {f"world_r{axis}": value for axis, value in zip("xyz", turn.as_rotvec(), strict=True)}
-    for name, part in case.measurements.groupby("target"):
+    for name, part in problem.measurements.groupby("target"):
         off = campaign.places[name] - rows.vectors(part, "target")[0]
         values |= {f"reflector_{name}_{axis}": value for axis, value in zip("xyz", off, strict=True)}
-    robot = case.mechanism
+    robot = problem.mechanism
     known = {name: value for name, value in values.items() if name in robot.deviation_names}
     return robot.parameters.vector(robot.identifiable(known))
 
@@ -113,43 +113,43 @@ def least_from(observations, start):
     return start + scale * found.x, 2.0 * found.cost
 
 
-def squares(case, state):
-    """Sum of squares in mm^2 that a State leaves."""
-    return float((case.residual(state) ** 2).sum())
+def squares(problem, state):
+    """Sum of squares in mm^2 that a ModelState leaves."""
+    return float((problem.residual(state) ** 2).sum())
 
 
 def outcome_of(kind, seed, **options):
     """The Outcome of a random campaign: of the calibration, of the core, and of frames alone on the nominal robot."""
     campaign = draw_campaign(kind, seed, **options)
-    result, case = Outcome(kind, seed), case_of(campaign)
-    model = EffectModel(case, (), np.zeros(0))
-    start = true_deviations(campaign, case)
+    result, problem = Outcome(kind, seed), problem_of(campaign)
+    model = EffectModel(problem, (), np.zeros(0))
+    start = true_deviations(campaign, problem)
     began = time.process_time()
     _, least = least_from(model, start)
     result.seconds["truth"] = time.process_time() - began
-    nominal = State(case.mechanism.parameters.nominal, {})
+    nominal = ModelState(problem.mechanism.parameters.nominal, {})
     searches = {
-        "calibrate": lambda: calibrate(case),
-        "core": lambda: fit_named_effects(case, (), nominal).state,
-        "frames": lambda: fit_frames(case, nominal),
+        "calibrate": lambda: calibrate(problem),
+        "core": lambda: fit_named_effects(problem, (), nominal).state,
+        "frames": lambda: fit_frames(problem, nominal),
     }
     for name, search in searches.items():
         began = time.process_time()
         try:
             state = search()
-            result.found_mm2[name] = squares(case, state)
+            result.found_mm2[name] = squares(problem, state)
         except FitError as error:
             result.found_mm2[name], result.messages[name] = np.inf, str(error)
         result.seconds[name] = time.process_time() - began
         result.least_mm2[name] = least
-    result.least_mm2["frames"] = _least_of_frames(campaign, case, nominal)
+    result.least_mm2["frames"] = _least_of_frames(campaign, problem, nominal)
     return result
 
 
-def _least_of_frames(campaign, case, nominal):
+def _least_of_frames(campaign, problem, nominal):
     """Least sum of squares of frames alone, from the true ones."""
-    numbers = open_numbers(case.mechanism.reads)
-    observations = FrameObservations(case, nominal, frame_directions(case.mechanism))
-    whole = replace(case.mechanism, among=(), sample=None, parameter_set="frame")
-    true = whole.parameters.mapping(true_deviations(campaign, replace(case, mechanism=whole)))
+    numbers = open_numbers(problem.mechanism.reads)
+    observations = FrameObservations(problem, nominal, frame_directions(problem.mechanism))
+    whole = replace(problem.mechanism, among=(), sample=None, parameter_set="frame")
+    true = whole.parameters.mapping(true_deviations(campaign, replace(problem, mechanism=whole)))
     return least_from(observations, np.array([true[one.name] for one in numbers]))[1]

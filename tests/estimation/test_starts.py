@@ -14,7 +14,7 @@ from rrru.estimation.problem import Problem
 from rrru.estimation.solver import SolverOptions, solve
 from rrru.estimation.starts import register_measurements
 from rrru.pipeline import setup
-from tests.estimation.from_truth import case_of, outcome_of, squares, unregistered_table
+from tests.estimation.from_truth import outcome_of, problem_of, squares, unregistered_table
 from tests.estimation.random_robots import KINDS, NOISE_MM, draw_campaign
 
 _SEEDS = range(3)
@@ -54,9 +54,9 @@ def test_registration_is_a_rigid_motion_of_positions_and_orientations():
 
 def test_outliers_leave_the_registration_where_it_is():
     campaign = draw_campaign("arm", 4)
-    clean = case_of(campaign)
+    clean = problem_of(campaign)
     campaign.measured_mm[::12] += np.random.default_rng(0).uniform(-500.0, 500.0, campaign.measured_mm[::12].shape)
-    moved = rows.measured(case_of(campaign).measurements)
+    moved = rows.measured(problem_of(campaign).measurements)
     good = np.arange(len(moved)) % 12 > 0
     assert np.abs(moved - rows.measured(clean.measurements))[good].max() < 5.0
 
@@ -64,17 +64,17 @@ def test_outliers_leave_the_registration_where_it_is():
 def test_what_a_gantry_does_not_determine_stays_at_nominal():
     """A gantry that never turns: a target's place and the frame's shift are confounded."""
     campaign = next(one for one in (draw_campaign("gantry", k) for k in range(20)) if one.actuators.shape[1] == 3)
-    case = case_of(campaign)
-    state = calibrate(case)
+    problem = problem_of(campaign)
+    state = calibrate(problem)
     assert np.abs(state.deviations).max() < 50.0
-    assert squares(case, state) < 3.0 * len(case) * (1.2 * NOISE_MM) ** 2
+    assert squares(problem, state) < 3.0 * len(problem) * (1.2 * NOISE_MM) ** 2
 
 
 def test_a_left_handed_frame_is_refused():
     campaign = draw_campaign("arm", 4)
     campaign.measured_mm[:, 1] *= -1.0
     with pytest.raises(FitError, match=r"left-handed one .* allowed: a right-handed frame: change the sign of one"):
-        case_of(campaign)
+        problem_of(campaign)
 
 
 class _Line:
@@ -106,4 +106,4 @@ def test_two_readings_register_nothing():
     few = table.iloc[:2]
     assert register_measurements(few, robot) is few
     with pytest.raises(FitError):
-        calibrate(case_of(campaign).without(np.arange(len(case_of(campaign))) > 2))
+        calibrate(problem_of(campaign).without(np.arange(len(problem_of(campaign))) > 2))

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rrru.diagnosis.detectability import detectability
-from rrru.diagnosis.state import State
+from rrru.diagnosis.state import ModelState
 from rrru.effects.library import NAMES, library
 from rrru.effects.protocol import PATH
 from rrru.studies import effect_catalogue as catalogue
@@ -48,18 +48,18 @@ def test_an_effect_states_its_equation_its_source_and_its_sizes(name):
 
 def test_every_need_has_words():
     needs = {
-        need for scene in catalogue.SCENES for one in library(scene.case().mechanism).values() for need in one.needs
+        need for scene in catalogue.SCENES for one in library(scene.problem().mechanism).values() for need in one.needs
     }
     assert needs | {PATH} <= set(catalogue.NEEDS)
 
 
 @pytest.mark.parametrize("scene", catalogue.SCENES, ids=lambda scene: scene.title)
 def test_the_most_confounded_effect_is_that_of_the_diagnosis(scene):
-    case = scene.case()
-    linear = case.linearise(State(np.zeros(len(case.mechanism.parameters)), {}))
+    problem = scene.problem()
+    linear = problem.linearise(ModelState(np.zeros(len(problem.mechanism.parameters)), {}))
     # a diagnosis has chosen the orders of an effect that has none before
-    case = replace(case, library={name: one for name, one in case.library.items() if len(one.coordinates)})
-    rows = detectability(case, linear).query("testable and confounded_with != ''").set_index("effect")
+    problem = replace(problem, library={name: one for name, one in problem.library.items() if len(one.coordinates)})
+    rows = detectability(problem, linear).query("testable and confounded_with != ''").set_index("effect")
     assert len(rows) > 5
     for name, row in rows.iterrows():
         rivals = catalogue.confounded(scene, name)
@@ -70,19 +70,19 @@ def test_the_most_confounded_effect_is_that_of_the_diagnosis(scene):
 def test_a_share_is_that_of_least_squares():
     """Of servo lag, what is left by a fit of the calibration, and by one of calibration and backlash together."""
     scene = catalogue.SCENES[0]
-    case = scene.case()
-    linear = case.linearise(State(np.zeros(len(case.mechanism.parameters)), {}))
+    problem = scene.problem()
+    linear = problem.linearise(ModelState(np.zeros(len(problem.mechanism.parameters)), {}))
 
     def columns(name):
-        shapes = range(len(case.library[name].coordinates.shapes))
-        return np.concatenate([linear.columns[name, shape].reshape(3 * len(case), -1) for shape in shapes], axis=1)
+        shapes = range(len(problem.library[name].coordinates.shapes))
+        return np.concatenate([linear.columns[name, shape].reshape(3 * len(problem), -1) for shape in shapes], axis=1)
 
     def left(wanted, *given):
         matrix = np.concatenate(given, axis=1)
         matrix = matrix / np.linalg.norm(matrix, axis=0)
         return ((wanted - matrix @ np.linalg.lstsq(matrix, wanted, rcond=1e-12)[0]) ** 2).sum()
 
-    base = linear.base.reshape(3 * len(case), -1)
-    wanted = columns("servo_lag") * case.library["servo_lag"].coordinates.typical
+    base = linear.base.reshape(3 * len(problem), -1)
+    wanted = columns("servo_lag") * problem.library["servo_lag"].coordinates.typical
     share = 1.0 - left(wanted, base, columns("backlash")) / left(wanted, base)
     assert catalogue.confounded(scene, "servo_lag")["backlash"] == pytest.approx(share, abs=1e-6)

@@ -31,7 +31,7 @@ def main(settings, inputs, outputs):
         causes.append(stated(name, result))
         numbers = fitted(parameter_rows(result.inference))
         fit = result.inference
-        states.append(state_row(name, fit.calibrated.deviations, result.state, fit.case.library, numbers))
+        states.append(state_row(name, fit.calibrated.deviations, result.state, fit.problem.library, numbers))
         budgets.append(result.tables["gap_budget"].assign(robot=name))
     frames = {
         "withheld_verdicts": pd.DataFrame(verdicts),

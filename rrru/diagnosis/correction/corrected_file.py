@@ -5,16 +5,21 @@ stiffness of the drives and `backlash` their backlash. A file cannot hold anythi
 its own masses. The model is in the frame of the measurements. Lengths in mm, angles in rad.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, cast
 
 import numpy as np
 import pandas as pd
 
 from rrru.campaign import measurements as rows
+from rrru.diagnosis.aliases import FloatArray
 from rrru.diagnosis.calibrate import calibrate
-from rrru.diagnosis.inference import with_effects
+from rrru.diagnosis.inference import InferenceResult, with_effects
 from rrru.diagnosis.model_fit import fit_model
 from rrru.diagnosis.options import OPTIONS
+from rrru.diagnosis.problem import DiagnosisProblem
 from rrru.diagnosis.result_notes import payload_notes
 from rrru.diagnosis.result_tables import parameter_rows
 from rrru.formats.file_changes import Found, held_by
@@ -22,6 +27,7 @@ from rrru.formats.mjcf_writer import to_mjcf
 from rrru.formats.robot_file import mjcf_parts, urdf_parts
 from rrru.formats.structure import structure_of
 from rrru.formats.urdf_writer import to_urdf
+from rrru.kinematics.general_robot import GeneralRobot
 
 # parameters of a drive in a file: the effect and the stem of its parameters
 _COMPLIANCE, _BACKLASH = ("drive_compliance", "compliance"), ("backlash", "width")
@@ -37,36 +43,36 @@ class Corrected:
     """
 
     text: str
-    not_in_model: tuple
-    lacking: tuple
+    not_in_model: tuple[str, ...]
+    lacking: tuple[str, ...]
     found: Found
-    in_file: dict = field(default_factory=dict)
+    in_file: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     mjcf: bool = False
 
 
-def found_of(inference, stated_reflectors=False):
+def found_of(inference: InferenceResult, stated_reflectors: bool = False) -> tuple[Found, list[str]]:
     """The Found of an inference, and the names of its effects that no file holds.
 
     stated_reflectors: whether reflectors whose places are stated belong to it, too.
     """
-    case, state = inference.case, inference.state
-    library, sites = case.library, case.mechanism.legs.sites
-    constant = {key: state.contribution(library, key, case.motion).twists for key in state.effects}
-    constant = {key: twists for key, twists in constant.items() if np.ndim(twists) == 3 and len(twists) == 1}
-    twists = case.mechanism.twists(state.deviations)[0] + sum(one[0] for one in constant.values())
+    problem, state = inference.problem, inference.state
+    library, sites = problem.library, problem.mechanism.legs.sites
+    changes = {key: np.asarray(state.contribution(library, key, problem.motion).twists) for key in state.effects}
+    constant = {key: twists for key, twists in changes.items() if twists.ndim == 3 and len(twists) == 1}
+    twists = problem.mechanism.twists(state.deviations)[0] + sum(one[0] for one in constant.values())
     steps, coordinates = inference.fit.one_sigma_steps()
-    spread = np.einsum("scp,qp->qsc", case.mechanism.directions, steps)
+    spread = np.einsum("scp,qp->qsc", problem.mechanism.directions, steps)
     for key, twist in constant.items():
-        moved = (state.contribution(library, key, case.motion, state.effects[key] + one) for one in coordinates[key])
-        spread = spread + np.stack([one.twists[0] - twist[0] for one in moved])
+        moved = (state.contribution(library, key, problem.motion, state.effects[key] + one) for one in coordinates[key])
+        spread = spread + np.stack([np.asarray(one.twists)[0] - twist[0] for one in moved])
     moves = [k for k in range(len(sites)) if twists[k].any() or spread[:, k].any()]
-    numbers, count = parameter_rows(inference), len(case.mechanism.parts.drives)
-    loads = np.nan_to_num(np.abs(case.motion.drive_load)).max(axis=0)
+    numbers, count = parameter_rows(inference), len(problem.mechanism.parts.drives)
+    loads = np.nan_to_num(np.abs(problem.motion.drive_load)).max(axis=0)
     found = Found(
         {sites[k]: twists[k] for k in moves},
         {sites[k]: spread[:, k] for k in moves},
-        _places(case, stated_reflectors),
-        tuple(case.mechanism.tool_mm),
+        _places(problem, stated_reflectors),
+        tuple(problem.mechanism.tool_mm),
         _of_drives(numbers, *_COMPLIANCE, count),
         _of_drives(numbers, *_BACKLASH, count),
         dict(enumerate(loads.tolist())),
@@ -75,13 +81,14 @@ def found_of(inference, stated_reflectors=False):
     return found, [name for name, _ in state.effects if name not in held]
 
 
-def fitted_in_file(inference, section):
+def fitted_in_file(inference: InferenceResult, section: dict[str, Any]) -> InferenceResult:
     """The InferenceResult with its hypothesis fitted in geometric numbers that the robot's own file can hold.
 
     Other parameters, such as shifts between the axes of a ball, can absorb errors in the fit; a file written without
     them would lack these corrections. section: the robot's entry in the configuration.
     """
-    mechanism = inference.case.mechanism
+    # a robot of a file is a GeneralRobot
+    mechanism = cast(GeneralRobot, inference.problem.mechanism)
     if "urdf" in section:
         parts = urdf_parts(section["urdf"], **{key: section.get(key) for key in ("base", "tip", "home")})
     else:
@@ -90,15 +97,15 @@ def fitted_in_file(inference, section):
     if set(mechanism.parameters.names) <= set(held):
         return inference
     names = [name for name in held if name in mechanism.among] if mechanism.among else held
-    case = replace(inference.case, mechanism=replace(mechanism, among=tuple(names)))
+    problem = replace(inference.problem, mechanism=replace(mechanism, among=tuple(names)))
     fitted, state = inference.fit.model, inference.state
-    start = replace(calibrate(case), effects=state.effects, shape_values=state.shape_values)
-    of_case = replace(fitted.case, mechanism=case.mechanism)
-    fit = fit_model(of_case, [start], fitted.terms, fitted.scales, inference.fit.level, fitted.signed)
-    return replace(inference, case=case, fit=fit)
+    start = replace(calibrate(problem), effects=state.effects, shape_values=state.shape_values)
+    of_problem = replace(fitted.problem, mechanism=problem.mechanism)
+    fit = fit_model(of_problem, [start], fitted.terms, fitted.scales, inference.fit.level, fitted.signed)
+    return replace(inference, problem=problem, fit=fit)
 
 
-def _with_misfit(inference, spread):
+def _with_misfit(inference: InferenceResult, spread: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
     """Errors (q, 6) by site of numbers that are fitted without effects that act: as large as what is left asks for.
 
     They are too small by the ratio of what the fit leaves to the noise and discrepancy that it assumes (R. Birge,
@@ -109,26 +116,26 @@ def _with_misfit(inference, spread):
     return {site: ratio * errors for site, errors in spread.items()}
 
 
-def _of_drives(numbers, effect, stem, count):
+def _of_drives(numbers: pd.DataFrame, effect: str, stem: str, count: int) -> dict[int, tuple[float, float]]:
     """(value, standard error) of an effect's parameter of every drive by its number from 0 on."""
     of_effect = numbers[numbers["effect"] == effect].set_index("parameter")
     columns = ["value", "standard_error"]
     return {k: tuple(of_effect.loc[f"{stem}{k + 1}", columns]) for k in range(count) if len(of_effect)}
 
 
-def _places(case, stated):
+def _places(problem: DiagnosisProblem, stated: bool) -> dict[str, FloatArray]:
     """Places (3,) on the platform, before what was found, by site: of reflectors that were found, or stated, too."""
-    reads = case.mechanism.reads
+    reads = problem.mechanism.reads
     wanted = set(reads.reflectors if stated else reads.fitted)
     if not wanted:
         return {}
-    on_world = rows.on_the_world(case.measurements)
-    frame = case.measurements if on_world is None else case.measurements[~on_world]
+    on_world = rows.on_the_world(problem.measurements)
+    frame = problem.measurements if on_world is None else problem.measurements[~on_world]
     places, sites = rows.vectors(frame, "target"), rows.sites(frame["target"]).to_numpy()
     return {name: places[np.flatnonzero(sites == name)[0]] for name in pd.unique(sites) if name in wanted}
 
 
-def corrected(inference, section, folder):
+def corrected(inference: InferenceResult, section: dict[str, Any], folder: Path) -> Corrected:
     """The Corrected file of an inference for a folder; section: the robot's entry in the configuration.
 
     Its numbers are fitted anew where the format cannot hold all effects and numbers that were. Raises ConfigError for a

@@ -5,27 +5,35 @@ points that were read, at the measured poses and at fresh ones between them. The
 values, with the effects that the file holds in addition to geometry.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from rrru.campaign import measurements as rows
 from rrru.campaign.stated_motion import rests
-from rrru.diagnosis.correction.corrected_file import corrected
+from rrru.diagnosis.aliases import FloatArray
+from rrru.diagnosis.correction.corrected_file import Corrected, corrected
 from rrru.diagnosis.correction.drive_table import at_end, at_rest, corrected_drives, effect_twists
+from rrru.diagnosis.diagnose import Diagnosis
+from rrru.diagnosis.inference import InferenceResult
 from rrru.diagnosis.options import OPTIONS
+from rrru.diagnosis.problem import DiagnosisProblem
 from rrru.diagnosis.result_notes import payload_notes
 from rrru.diagnosis.shrink import model_row
 from rrru.diagnosis.verdict_text import NOT_CORRECTED, expected_mm, readable
 from rrru.effects.library import active_effects
-from rrru.effects.protocol import together
+from rrru.effects.protocol import Motion, together
 from rrru.errors import ConfigError, SimulationError, UnreachableError
-from rrru.formats.file_changes import placement_of
+from rrru.formats.file_changes import Found, placement_of
 from rrru.formats.robot_file import with_tip
 from rrru.kinematics.chain import Poses
+from rrru.kinematics.dynamics import Masses
 from rrru.kinematics.legs import TOOL, WORLD
+from rrru.kinematics.robot import Robot
 from rrru.robots.catalogue import make_mechanism
 from rrru.seeds import stream
 from rrru.simulation.mujoco_robot import MujocoRobot
@@ -35,7 +43,9 @@ from rrru.store.atomic_write import write_text
 _WITHOUT_ROWS = ("robot", "path_drive", "load_slopes")
 
 
-def write_corrected(diagnosis, section, masses, file, seed=0):
+def write_corrected(
+    diagnosis: Diagnosis, section: dict[str, Any], masses: Masses, file: Path | str, seed: int = 0
+) -> Diagnosis:
     """The Diagnosis with residual errors of its robot's corrected file, and `corrected_drives`; writes the file.
 
     A file that cannot be corrected, or whose loops of bodies do not close afterwards, becomes an empty one with the
@@ -69,13 +79,13 @@ def write_corrected(diagnosis, section, masses, file, seed=0):
     return replace(diagnosis, verdict=verdict, tables=diagnosis.tables | tables)
 
 
-def _left_mm(steps, kind):
+def _left_mm(steps: pd.DataFrame, kind: str) -> float:
     """Root mean square residual in mm on all trajectories of the last row of a kind of `gap_shrink`, NaN for none."""
     chosen = steps[(steps["kind"] == kind) & (steps["trajectory"] == "*")] if len(steps) else steps
     return float(chosen["rms_mm"].iloc[-1]) if len(chosen) else np.nan
 
 
-def _refuse_worse(more):
+def _refuse_worse(more: pd.DataFrame) -> None:
     """Raise ConfigError where the residual error of the corrected file exceeds that of the file as it came."""
     given, written = _left_mm(more, "given_model"), _left_mm(more, "corrected_model")
     if written > given:
@@ -84,7 +94,9 @@ def _refuse_worse(more):
         )
 
 
-def _remainder(shrink, more, written, inference, expected):
+def _remainder(
+    shrink: pd.DataFrame, more: pd.DataFrame, written: Corrected, inference: InferenceResult, expected: float
+) -> str:
     """Residual error of a corrected file beyond that of the diagnosis, in words, empty where negligible.
 
     written: the Corrected file; inference: the InferenceResult, whose payload and tilt no file holds, and for whose
@@ -94,38 +106,38 @@ def _remainder(shrink, more, written, inference, expected):
     left, whole = _left_mm(more, "corrected_model"), _left_mm(shrink, "held_out")
     if written.lacking or of_weight:
         names = ", ".join([*map(readable, written.lacking), *(f"that {note}" for note in of_weight)])
-        size = f": {expected:.2g} mm rms remain {_conditions(inference.case)}" if np.isfinite(expected) else ""
+        size = f": {expected:.2g} mm rms remain {_conditions(inference.problem)}" if np.isfinite(expected) else ""
         return f"this {_holds(written)} and not {names}{size}; use corrected_drives"
     if not left > OPTIONS.max_file_remainder_ratio * whole:
         return ""
     return f"this file leaves {left:.2g} mm rms at the readings, the diagnosis {whole:.2g} mm; use corrected_drives"
 
 
-def _conditions(case):
+def _conditions(problem: DiagnosisProblem) -> str:
     """Poses, payloads, speeds and temperatures of the readings in use, in words: a residual error holds for these."""
-    frame = case.measurements[case.used]
+    frame = problem.measurements[problem.used]
     moved = "robot at rest" if rests(frame) else _range(frame, "speed_mm_s", "speed", "mm/s")
     loads = (_range(frame, "payload_kg", "payload", "kg"), moved, _range(frame, "temperature_c", "temperature", "°C"))
     return f"at poses and loads like those measured ({', '.join(loads)})"
 
 
-def _range(frame, column, word, unit):
+def _range(frame: pd.DataFrame, column: str, word: str, unit: str) -> str:
     """The range of a column in words, "unknown" where nothing was recorded."""
-    values = frame[column].dropna() if column in frame else ()
+    values = frame[column].dropna() if column in frame else pd.Series(dtype=float)
     if not len(values):
         return f"{word} unknown"
     low, high = f"{values.min():.3g}", f"{values.max():.3g}"
     return f"{word} {low if low == high else f'{low} to {high}'} {unit}"
 
 
-def _holds(written):
+def _holds(written: Corrected) -> str:
     """What a Corrected file's format holds."""
     if written.mjcf:
         return "MJCF holds geometry, compliance and backlash of the drives"
     return "URDF holds the geometry only"
 
 
-def _headline(written, error):
+def _headline(written: Corrected, error: "FileError") -> str:
     """That a corrected file is worse than the calibration, and why, in words; empty where it is not."""
     if not error.readings_mm > OPTIONS.max_file_remainder_ratio * error.calibrated_mm:
         return ""
@@ -136,13 +148,15 @@ def _headline(written, error):
     return f"the corrected file has a residual error of {sizes}{lacking}"
 
 
-def _model(inference, written, section, file):
+def _model(inference: InferenceResult, written: Corrected, section: dict[str, Any], file: Path) -> "FileModel":
     """The FileModel of a Corrected file, loaded anew."""
-    robot = _robot(inference.case, section | {"mjcf" if written.mjcf else "urdf": str(file)})
-    return FileModel(robot, written.in_file, _instrument(inference.case, robot, written.found, True))
+    robot = _robot(inference.problem, section | {"mjcf" if written.mjcf else "urdf": str(file)})
+    return FileModel(robot, written.in_file, _instrument(inference.problem, robot, written.found, True))
 
 
-def gap_rows(inference, corrected, section, file, shrink):
+def gap_rows(
+    inference: InferenceResult, corrected: Corrected, section: dict[str, Any], file: Path, shrink: pd.DataFrame
+) -> tuple[pd.DataFrame, str]:
     """Rows of `gap_shrink`: of the robot's file as it came, and of the Corrected one, and why MuJoCo did not drive it.
 
     section: the robot's entry in the configuration; file: the corrected one; shrink: the other rows. MuJoCo drives an
@@ -152,38 +166,39 @@ def gap_rows(inference, corrected, section, file, shrink):
     """
     key = "mjcf" if "mjcf" in section else "urdf"
     models = [
-        ("given_model", _robot(inference.case, section), {}),
-        ("corrected_model", _robot(inference.case, section | {key: str(file)}), corrected.in_file),
+        ("given_model", _robot(inference.problem, section), {}),
+        ("corrected_model", _robot(inference.problem, section | {key: str(file)}), corrected.in_file),
     ]
     files, why = (section[key], file), ""
     try:
         if key == "urdf":
             raise ConfigError("a URDF has no actuators")
         poses = [
-            simulated(inference.case.motion, robot, Path(one), section["platform"])
+            simulated(inference.problem.motion, robot, Path(one), section["platform"])
             for (_, robot, _), one in zip(models, files, strict=True)
         ]
     except (ConfigError, SimulationError, UnreachableError) as error:
         why = f"corrected model not driven, but closed at its drive values, since {error}"
-        poses = [_closed(inference.case, robot, effects) for _, robot, effects in models]
-    result, case = [], inference.case
-    known = case.on_robot & case.complete({term.effect for term in inference.fit.terms})
+        poses = [_closed(inference.problem, robot, effects) for _, robot, effects in models]
+    result, problem = [], inference.problem
+    known = problem.on_robot & problem.complete({term.effect for term in inference.fit.terms})
     for (kind, robot, _), (at, twists) in zip(models, poses, strict=True):
-        twists = twists + _instrument(case, robot, corrected.found, kind == "corrected_model")
+        twists = twists + _instrument(problem, robot, corrected.found, kind == "corrected_model")
         # the file is not judged where the sense of arrival of a drive is unknown
-        left = np.where(known[:, None], case.by_other(robot, at, twists), np.nan)
+        left = np.where(known[:, None], problem.by_other(robot, at, twists), np.nan)
         if np.isfinite(left).all(axis=1).any():
-            result.append(model_row(shrink, kind, left, case.noise_mm))
+            result.append(model_row(shrink, kind, left, problem.noise_mm))
     return pd.DataFrame(result), why
 
 
-def _robot(case, section):
+def _robot(problem: DiagnosisProblem, section: dict[str, Any]) -> Robot:
     """The robot of a file."""
-    robot = make_mechanism(case.mechanism.name, section, parameter_set="frame")
-    return robot.reading(case.mechanism.reads)
+    robot = make_mechanism(problem.mechanism.name, section, parameter_set="frame")
+    reading: Robot = robot.reading(problem.mechanism.reads)
+    return reading
 
 
-def simulated(motion, robot, file, platform):
+def simulated(motion: Motion, robot: Robot, file: Path, platform: str) -> tuple[Poses, FloatArray]:
     """Poses (n) of an MJCF that MuJoCo drives along a Motion, NaN beyond what is driven, and no twists.
 
     robot: of the file. Raises ConfigError, SimulationError or UnreachableError where it cannot be driven.
@@ -200,7 +215,7 @@ def simulated(motion, robot, file, platform):
     return whole, robot.twists()
 
 
-def _nowhere(robot, count):
+def _nowhere(robot: Robot, count: int) -> Poses:
     """Poses (n) that are unknown."""
     passive = np.zeros((count, len(robot.legs.passive_joints)))
     return Poses(
@@ -212,26 +227,28 @@ def _nowhere(robot, count):
     )
 
 
-def _closed(case, robot, effects):
+def _closed(
+    problem: DiagnosisProblem, robot: Robot, effects: Mapping[str, Mapping[str, float]]
+) -> tuple[Poses, FloatArray]:
     """Poses (n) of a robot closed at the drive values of the campaign and what effects add, and its twists."""
-    twists = FileModel(robot, effects, robot.twists()).twists(case.motion)
-    actuators, command = rows.actuators(case.measurements, robot), rows.command(case.measurements)
+    twists = FileModel(robot, effects, robot.twists()).twists(problem.motion)
+    actuators, command = rows.actuators(problem.measurements, robot), rows.command(problem.measurements)
     return robot.solve(actuators, command, twists), twists
 
 
-def _instrument(case, robot, found, corrected):
+def _instrument(problem: DiagnosisProblem, robot: Robot, found: Found, corrected: bool) -> FloatArray:
     """Twists (1, sites, 6) of what is read: the reflectors' places, and the tool's where it is corrected or these are.
 
     The frame is the file's, so that reflectors that are not on the robot are moved by it.
     """
     result, numbers = robot.twists(), robot.legs.site_numbers
-    reads = case.mechanism.reads
+    reads = problem.mechanism.reads
     named = {*reads.fitted, *((TOOL,) if corrected or reads.fitted or reads.turned else ())}
     for name in named & set(found.twists):
         result[0, numbers[name]] = found.twists[name]
-    on_world = rows.on_the_world(case.measurements)
+    on_world = rows.on_the_world(problem.measurements)
     if on_world is not None:
-        frame = case.measurements[on_world]
+        frame = problem.measurements[on_world]
         places, sites = rows.vectors(frame, "target"), rows.sites(frame["target"]).to_numpy()
         world = placement_of(found.twists.get(WORLD, np.zeros(6)))
         for name in pd.unique(sites):
@@ -247,11 +264,11 @@ class FileModel:
     what is read.
     """
 
-    robot: object
-    effects: dict
-    instrument: np.ndarray
+    robot: Robot
+    effects: Mapping[str, Mapping[str, float]]
+    instrument: FloatArray
 
-    def twists(self, motion):
+    def twists(self, motion: Motion) -> FloatArray:
         """Twists (n or 1, sites, 6) of robot and effects along a Motion of the diagnosed robot."""
         acting = active_effects(self.effects, self.robot)
         return self.robot.twists() + (together(acting, replace(motion, robot=self.robot)).twists if acting else 0.0)
@@ -269,36 +286,40 @@ class FileError:
     calibrated_mm: float
 
 
-def file_error(inference, model, masses, generator):
+def file_error(
+    inference: InferenceResult, model: FileModel, masses: Masses, generator: np.random.Generator
+) -> FileError:
     """The FileError of a FileModel; masses: of the robot; generator: draws the fresh poses."""
-    case = inference.case
-    actuators, command = case.driven
-    twists = model.twists(case.motion)
+    problem = inference.problem
+    actuators, command = problem.driven
+    twists = model.twists(problem.motion)
     poses = model.robot.solve(actuators, command, twists)
-    of_file = case.by_other(model.robot, poses, twists + model.instrument)
-    known = case.on_robot & case.complete({term.effect for term in inference.fit.terms})
+    of_file = problem.by_other(model.robot, poses, twists + model.instrument)
+    known = problem.on_robot & problem.complete({term.effect for term in inference.fit.terms})
     of_file, diagnosed, calibrated = (
-        left[known] for left in (of_file, case.residual(inference.state), case.residual(inference.calibrated))
+        left[known] for left in (of_file, problem.residual(inference.state), problem.residual(inference.calibrated))
     )
     fresh = _fresh_differences(inference, model, masses, generator)
     return FileError(_rms(of_file - diagnosed), _rms(fresh), _rms(of_file), _rms(calibrated))
 
 
-def _rms(distances_mm):
+def _rms(distances_mm: FloatArray) -> float:
     """Root mean square length of vectors (n, 3) without those that are unknown, NaN where all are."""
     squares = (distances_mm[np.isfinite(distances_mm).all(axis=1)] ** 2).sum(axis=1)
     return float(np.sqrt(squares.mean())) if len(squares) else np.nan
 
 
-def _fresh_differences(inference, model, masses, generator):
+def _fresh_differences(
+    inference: InferenceResult, model: FileModel, masses: Masses, generator: np.random.Generator
+) -> FloatArray:
     """Vectors (n, 3) from the file's robot to the diagnosed one at fresh poses, NaN where one of them has none.
 
     The drive values are weighted means of those at three measured poses, so that they lie within the measured range.
     """
-    case = inference.case
-    robot, (actuators, command) = case.mechanism, case.driven
-    on_world = rows.on_the_world(case.measurements)
-    usable = np.flatnonzero(case.used if on_world is None else case.used & ~on_world)
+    problem = inference.problem
+    robot, (actuators, command) = problem.mechanism, problem.driven
+    on_world = rows.on_the_world(problem.measurements)
+    usable = np.flatnonzero(problem.used if on_world is None else problem.used & ~on_world)
     picks = usable[generator.integers(len(usable), size=(OPTIONS.fresh_poses, 3))]
     share = generator.dirichlet(np.ones(3), len(picks))
     drive, near = (np.einsum("nk,nkd->nd", share, values[picks]) for values in (actuators, command))
@@ -307,8 +328,8 @@ def _fresh_differences(inference, model, masses, generator):
     closed = np.flatnonzero(poses.closed)
     drive, approach = drive[closed], approach[closed]
     position = robot.measured(poses.of(closed), robot.twists())
-    motion = at_rest(robot, masses, (position, drive, *at_end(case)), approach, drive)
-    readings = None if case.readings is None else case.readings.of(picks[closed, 0])
+    motion = at_rest(robot, masses, (position, drive, *at_end(problem)), approach, drive)
+    readings = None if problem.readings is None else problem.readings.of(picks[closed, 0])
     diagnosed, written = (
         robot.twists(inference.state.deviations) + effect_twists(inference, motion),
         model.twists(motion),

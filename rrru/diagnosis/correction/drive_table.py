@@ -10,20 +10,25 @@ from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from rrru.campaign import measurements as rows
+from rrru.diagnosis.aliases import FloatArray, IntArray
+from rrru.diagnosis.inference import InferenceResult
 from rrru.diagnosis.options import OPTIONS
+from rrru.diagnosis.problem import DiagnosisProblem
 from rrru.effects.motion import Course, make_motion
-from rrru.effects.protocol import Contribution
+from rrru.effects.protocol import Contribution, Motion
+from rrru.kinematics.dynamics import Masses
 from rrru.kinematics.inverse import inverse_kinematics
+from rrru.kinematics.robot import Robot
 
 # how far away the drives come from, longer than any backlash
 _APPROACH = {"rad": OPTIONS.approach_distance_rad, "mm": OPTIONS.approach_distance_mm}
 
 
-def corrected_drives(inference, masses):
+def corrected_drives(inference: InferenceResult, masses: Masses) -> pd.DataFrame:
     """Rows of `corrected_drives` of an inference; masses: of the robot."""
-    case = inference.case
-    robot, known = case.mechanism, case.used
-    commands, drives = rows.command(case.measurements)[known], rows.actuators(case.measurements, robot)[known]
+    problem = inference.problem
+    robot, known = problem.mechanism, problem.used
+    commands, drives = rows.command(problem.measurements)[known], rows.actuators(problem.measurements, robot)[known]
     position, nearest = _grid(commands)
     stated = robot.solve(drives[nearest], commands[nearest])
     turn = stated.turn
@@ -32,7 +37,7 @@ def corrected_drives(inference, masses):
     )
     reached = np.isfinite(nominal).all(axis=1)
     position, turn, nominal = position[reached], turn[reached], nominal[reached]
-    payload, end_s = at_end(case)
+    payload, end_s = at_end(problem)
     found = {}
     for approach in (-1, 1):
         corrected = nominal
@@ -46,7 +51,12 @@ def corrected_drives(inference, masses):
     return _table(robot, (position, turn), (nominal, found), {"payload_kg": payload, "time_s": end_s})
 
 
-def _table(robot, place, drives, state):
+def _table(
+    robot: Robot,
+    place: tuple[FloatArray, FloatArray],
+    drives: tuple[FloatArray, dict[int, FloatArray]],
+    state: dict[str, float],
+) -> pd.DataFrame:
     """The rows of places and drives: nominal ones (n, K), and found ones (n, K) by the side that they come from."""
     (position, turn), (nominal, found) = place, drives
     vectors = Rotation.from_matrix(turn).as_rotvec().reshape(-1, 3)
@@ -62,7 +72,7 @@ def _table(robot, place, drives, state):
     return table[np.isfinite(table.to_numpy(dtype=float)).all(axis=1)].reset_index(drop=True)
 
 
-def _grid(commands):
+def _grid(commands: FloatArray) -> tuple[FloatArray, IntArray]:
     """Points (g, 3) of the box about commands (n, 3) that one of these is near, and its number (g,)."""
     low, high = commands.min(axis=0), commands.max(axis=0)
     lines = [
@@ -75,13 +85,19 @@ def _grid(commands):
     return points[far <= OPTIONS.max_grid_distance_steps], number[far <= OPTIONS.max_grid_distance_steps]
 
 
-def at_end(case):
-    """The largest payload in kg and the time in s of the end of a Case's campaign."""
-    payload_kg = float(np.nan_to_num(case.motion.payload_kg[case.used]).max(initial=0.0))
-    return payload_kg, float(np.nanmax(case.motion.time_s, initial=0.0))
+def at_end(problem: DiagnosisProblem) -> tuple[float, float]:
+    """The largest payload in kg and the time in s of the end of a problem's campaign."""
+    payload_kg = float(np.nan_to_num(problem.motion.payload_kg[problem.used]).max(initial=0.0))
+    return payload_kg, float(np.nanmax(problem.motion.time_s, initial=0.0))
 
 
-def at_rest(robot, masses, state, approach, nominal):
+def at_rest(
+    robot: Robot,
+    masses: Masses,
+    state: tuple[FloatArray, FloatArray, float, float],
+    approach: float | FloatArray,
+    nominal: FloatArray,
+) -> Motion:
     """The Motion at rest at positions (n, 3) and drives (n, K), to which all drives came from one side.
 
     approach: 1 from smaller values, -1 from larger ones, one number or (n, 1); nominal (n, K): drive values that bring
@@ -102,15 +118,16 @@ def at_rest(robot, masses, state, approach, nominal):
         payload_kg=np.full(count, payload),
         drive_motion=(np.zeros_like(drive), np.zeros_like(drive)),
     )
-    return make_motion(robot, masses, course, (nominal, robot.map_at(nominal, position)))
+    motion: Motion = make_motion(robot, masses, course, (nominal, robot.map_at(nominal, position)))
+    return motion
 
 
-def effect_twists(inference, motion):
+def effect_twists(inference: InferenceResult, motion: Motion) -> FloatArray:
     """Twists of the effects of an inference's state that a robot at rest has."""
-    state, library = inference.state, inference.case.library
+    state, library = inference.state, inference.problem.library
     change = Contribution(motion.robot.twists())
     for key in state.effects:
         needs = library[key[0]].needs
         if all(np.isfinite(getattr(motion, need)).all() for need in needs):
             change = change + state.contribution(library, key, motion)
-    return change.twists
+    return np.asarray(change.twists)

@@ -8,6 +8,7 @@ worth f times as much. No candidate exceeds the limits of the robot, see
 `rrru.diagnosis.design.run_limits`.
 """
 
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 
@@ -15,11 +16,16 @@ import numpy as np
 import pandas as pd
 
 from rrru.campaign import measurements as rows
+from rrru.diagnosis.aliases import FloatArray, Row
 from rrru.diagnosis.design import poses
-from rrru.diagnosis.design.expected_information import contests_of, greedy, realized, worth
+from rrru.diagnosis.design.expected_information import Contest, contests_of, greedy, realized, worth
 from rrru.diagnosis.design.run_limits import RunLimits, StatedLimits, run_limits
-from rrru.diagnosis.make_problem import make_case
+from rrru.diagnosis.inference import InferenceResult
+from rrru.diagnosis.make_problem import make_diagnosis_problem
 from rrru.diagnosis.options import OPTIONS
+from rrru.diagnosis.problem import DiagnosisProblem
+from rrru.diagnosis.verdict import Verdict
+from rrru.kinematics.dynamics import Masses
 
 RUN = ("run", "kind", "trajectory", "reverse", "speed_mm_s", "payload_kg", "points")
 _COLUMNS = (*RUN, "separates", "now_nats", "gain_nats")
@@ -48,7 +54,13 @@ class Advice:
 NOTHING = Advice(pd.DataFrame(columns=_COLUMNS), pd.DataFrame(columns=_POSE))
 
 
-def advise(inference, verdict, masses, stated=None, sizes=None):
+def advise(
+    inference: InferenceResult,
+    verdict: Verdict,
+    masses: Masses,
+    stated: StatedLimits | None = None,
+    sizes: Mapping[str, float] | None = None,
+) -> Advice:
     """The Advice, empty where no rival answer is left that the library can predict.
 
     stated: StatedLimits of the robot, by default none; sizes: by effect the rms in mm of its part of the gap. Runs that
@@ -58,7 +70,7 @@ def advise(inference, verdict, masses, stated=None, sizes=None):
     if not contests:
         return NOTHING
     stated = stated or StatedLimits()
-    limits, limited = run_limits(inference.case, masses, stated)
+    limits, limited = run_limits(inference.problem, masses, stated)
     result = _runs(inference, contests, masses, limits)
     seen = [_realized(inference, contest, result, number) for number, contest in enumerate(contests)]
     result = [_as_realized(row, seen[row["contest"]]) for row in result]
@@ -82,12 +94,12 @@ def advise(inference, verdict, masses, stated=None, sizes=None):
     return Advice(runs, listed, undecided, limited or (stated.words if open_still else ""))
 
 
-def _runs(inference, contests, masses, limits):
+def _runs(inference: InferenceResult, contests: Sequence[Contest], masses: Masses, limits: RunLimits) -> list[Row]:
     """Rows of `gap_next_runs` of all candidate runs, with the number of the Contest that each is counted for."""
-    choice, table = candidates(inference.case.measurements, limits)
+    choice, table = candidates(inference.problem.measurements, limits)
     if not choice:
         return []
-    planned, result = _planned(inference.case, table, masses), []
+    planned, result = _planned(inference.problem, table, masses), []
     for number, contest in enumerate(contests):
         if not _have_inputs(planned, contest):
             continue
@@ -99,7 +111,9 @@ def _runs(inference, contests, masses, limits):
     return result
 
 
-def _realized(inference, contest, rows, number):
+def _realized(
+    inference: InferenceResult, contest: Contest, rows: Sequence[Row], number: int
+) -> tuple[float, dict[str, float]]:
     """Share of the expected gain that the last run along a trajectory driven before has added, at most 1.
 
     1 where it was not expected to decide. And the expected gain of a plain repetition by trajectory; number: of the
@@ -107,7 +121,7 @@ def _realized(inference, contest, rows, number):
     """
     again = [row for row in rows if row["contest"] == number and row["run"] == f"{row['trajectory']} {_AGAIN}"]
     expected = {row["trajectory"]: row["gain_nats"] for row in again}
-    frame = inference.case.measurements[inference.case.used]
+    frame = inference.problem.measurements[inference.problem.used]
     driven = frame.groupby("run", sort=False)["trajectory"].first().astype(str)
     repeated = driven[driven.duplicated() & driven.isin(expected)]
     if repeated.empty:
@@ -122,7 +136,7 @@ def _realized(inference, contest, rows, number):
     return float(min(found / whole, 1.0)), expected
 
 
-def _as_realized(row, seen):
+def _as_realized(row: Row, seen: tuple[float, Mapping[str, float]]) -> Row:
     """A row of `gap_next_runs` whose gain without another payload or speed is multiplied by `_realized`'s share."""
     share, expected = seen
     plain = expected.get(row["trajectory"], max(expected.values(), default=0.0))
@@ -131,29 +145,34 @@ def _as_realized(row, seen):
     return row | {"gain_nats": row["gain_nats"] - (1.0 - share) * min(row["gain_nats"], max(plain, 0.0))}
 
 
-def _planned(case, table, masses):
-    """The case of a table of planned runs."""
-    return make_case(table, case.mechanism, masses, case.noise_mm, case.effects, arm_mm=case.arm_mm)
+def _planned(problem: DiagnosisProblem, table: pd.DataFrame, masses: Masses) -> DiagnosisProblem:
+    """The problem of a table of planned runs."""
+    return make_diagnosis_problem(
+        table, problem.mechanism, masses, problem.noise_mm, problem.effects, arm_mm=problem.arm_mm
+    )
 
 
-def _have_inputs(planned, contest):
+def _have_inputs(planned: DiagnosisProblem, contest: Contest) -> bool:
     """Whether planned runs have what the effects of a Contest need, such as times or temperatures."""
     answers = contest.truth, contest.rival
     return all(term.effect in planned.library for hypothesis, _ in answers for term in hypothesis.terms)
 
 
-def _poses(inference, contest, masses, limits):
+def _poses(
+    inference: InferenceResult, contest: Contest, masses: Masses, limits: RunLimits
+) -> tuple[list[Row], pd.DataFrame]:
     """The row of poses of `gap_next_runs` in a list, which is empty where there are none, and `gap_next_poses`.
 
     They are driven as the campaign was, or faster, or with a higher payload, whichever is most informative.
     """
-    case, best = inference.case, ([], NOTHING.poses)
-    passes = poses.passes(case.measurements, case.mechanism)
+    problem = inference.problem
+    best: tuple[list[Row], pd.DataFrame] = [], NOTHING.poses
+    passes = poses.passes(problem.measurements, problem.mechanism)
     if not len(passes):
         return best
-    stated_speed, own_load = (float(case.measurements[name].median()) for name in ("speed_mm_s", "payload_kg"))
-    own_speed = stated_speed if np.isfinite(stated_speed) else _speed(case.measurements)
-    last_s, own_load, most = _end_s(case.measurements), float(np.nan_to_num(own_load)), 0.0
+    stated_speed, own_load = (float(problem.measurements[name].median()) for name in ("speed_mm_s", "payload_kg"))
+    own_speed = stated_speed if np.isfinite(stated_speed) else _speed(problem.measurements)
+    last_s, own_load, most = _end_s(problem.measurements), float(np.nan_to_num(own_load)), 0.0
     for fast, loaded in product((False, True), repeat=2):
         speed = limits.fast(stated_speed, np.full(1, np.nan)) if fast else own_speed
         load = limits.loaded_kg(own_load) if loaded else own_load
@@ -163,8 +182,8 @@ def _poses(inference, contest, masses, limits):
         some = passes.some([not fast or limits.slower(rate * speed) >= 1.0 for rate in passes.rates_per_mm])
         if not len(some) or not limits.allows(speed, load):
             continue
-        table = some.commands(case.mechanism, last_s + OPTIONS.pause_between_runs_s, speed, load)
-        planned = _planned(case, table, masses)
+        table = some.commands(problem.mechanism, last_s + OPTIONS.pause_between_runs_s, speed, load)
+        planned = _planned(problem, table, masses)
         if not _have_inputs(planned, contest):
             continue
         now, added = worth(inference, contest.truth, contest.rival, planned)
@@ -183,17 +202,17 @@ def _poses(inference, contest, masses, limits):
     return best
 
 
-def _how(fast, loaded, speed, load):
+def _how(fast: bool, loaded: bool, speed: float, load: float) -> list[str]:
     """In words how a kind of pass differs from those of the campaign."""
     return [f"at {speed:g} mm/s"] * fast + [f"with {load:g} kg payload"] * loaded
 
 
-def _end_s(frame):
+def _end_s(frame: pd.DataFrame) -> float:
     """Time at which a measurement table ends, NaN where it has none."""
     return np.nanmax(frame["time_s"].to_numpy(dtype=float)) if frame["time_s"].notna().any() else np.nan
 
 
-def _speed(frame):
+def _speed(frame: pd.DataFrame) -> float:
     """Speed in mm/s between the points of a measurement table, by its times; NaN where it has none."""
     way = np.linalg.norm(np.diff(rows.command(frame), axis=0), axis=1)
     time = np.diff(frame["time_s"].to_numpy(dtype=float))
@@ -201,7 +220,7 @@ def _speed(frame):
     return float(np.median(way[moved] / time[moved])) if moved.any() else np.nan
 
 
-def candidates(frame, limits=None):
+def candidates(frame: pd.DataFrame, limits: RunLimits | None = None) -> tuple[list[Row], pd.DataFrame]:
     """Candidate runs as mappings of the columns RUN of `gap_next_runs`, and their commands, numbered from 1.
 
     Every kind of pass along some of a measurement table's trajectories that keeps the RunLimits, by default those of a
@@ -212,7 +231,8 @@ def candidates(frame, limits=None):
     # passes of poses that were driven before are no trajectories
     names = count.index[(count > OPTIONS.points_per_pass) | (count.max() <= OPTIONS.points_per_pass)]
     chosen = names[np.unique(np.linspace(0, len(names) - 1, OPTIONS.max_advised_trajectories).astype(int))]
-    end, result, tables = _end_s(frame), [], []
+    end, result = _end_s(frame), []
+    tables: list[pd.DataFrame] = []
     for name in chosen:
         first = frame[frame["trajectory"] == name]
         first = first[first["run"] == first["run"].iloc[0]]
@@ -232,15 +252,15 @@ def candidates(frame, limits=None):
     return result, pd.concat(tables, ignore_index=True) if tables else frame.iloc[:0]
 
 
-def _rates(run, columns):
+def _rates(run: pd.DataFrame, columns: Iterable[str]) -> FloatArray:
     """Largest rates (K,) of the drives of some columns between the points of a run; NaN where it has no times."""
     time = np.diff(run["time_s"].to_numpy(dtype=float))
     way = np.abs(np.diff(run[[*columns]].to_numpy(dtype=float), axis=0))
     rate = np.divide(way, time[:, None], out=np.full(way.shape, np.nan), where=time[:, None] > 0.0)
-    return np.nanmax(rate, axis=0, initial=0.0)
+    return np.asarray(np.nanmax(rate, axis=0, initial=0.0))
 
 
-def _seconds(run):
+def _seconds(run: pd.DataFrame) -> float:
     """Driving time of a run, by its times, else by its way and its speed; NaN where it has neither."""
     time = run["time_s"].to_numpy(dtype=float)
     if np.isfinite(time).any():
@@ -249,7 +269,9 @@ def _seconds(run):
     return float(way / run["speed_mm_s"].iloc[0])
 
 
-def _pass(first, number, start_s, reverse, speed_mm_s, payload_kg):
+def _pass(
+    first: pd.DataFrame, number: int, start_s: float, reverse: bool, speed_mm_s: float, payload_kg: float
+) -> pd.DataFrame:
     """Table of one more pass along the points of a run."""
     run = (first.iloc[::-1] if reverse else first).reset_index(drop=True)
     clock = first["time_s"].to_numpy(dtype=float)

@@ -9,109 +9,118 @@ If hypothesis A holds with its fitted parameters, its data differ from the best 
 nats. Further points add to the sums of squares and products that I is made of; the increase of I is their worth.
 """
 
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 import pandas as pd
 
+from rrru.diagnosis.aliases import FloatArray
+from rrru.diagnosis.hypothesis import Answer
+from rrru.diagnosis.inference import InferenceResult
 from rrru.diagnosis.options import OPTIONS
-from rrru.diagnosis.state import State
+from rrru.diagnosis.posterior import Posterior
+from rrru.diagnosis.problem import DiagnosisProblem
+from rrru.diagnosis.state import ModelState
 from rrru.diagnosis.terms import signatures, spread
-from rrru.diagnosis.verdict import label
+from rrru.diagnosis.verdict import Verdict, label
 
 
 @dataclass(frozen=True)
 class Sums:
     """Sums over points of a design (k numbers) and of data, over the noise: precision (k, k), moment (k,), square."""
 
-    precision: np.ndarray
-    moment: np.ndarray
+    precision: FloatArray
+    moment: FloatArray
     square: float
 
-    def __add__(self, other):
+    def __add__(self, other: "Sums") -> "Sums":
         return Sums(self.precision + other.precision, self.moment + other.moment, self.square + other.square)
 
-    def __sub__(self, other):
+    def __sub__(self, other: "Sums") -> "Sums":
         return Sums(self.precision - other.precision, self.moment - other.moment, self.square - other.square)
 
     @classmethod
-    def of(cls, design, data, noise_mm):
+    def of(cls, design: FloatArray, data: FloatArray, noise_mm: float) -> Self:
         """The Sums of a design (n, 3, k) and data (n, 3) under a noise per axis."""
         flat, target = design.reshape(-1, design.shape[-1]) / noise_mm, data.ravel() / noise_mm
         return cls(flat.T @ flat, flat.T @ target, float(target @ target))
 
-    def nats(self):
+    def nats(self) -> float:
         """Half of the least squares that the design leaves of the data."""
         unit = 1.0 / np.sqrt(np.maximum(np.diag(self.precision), 1e-300))
         scaled = unit[:, None] * self.precision * unit + 1e-12 * np.eye(len(unit))
         moment = unit * self.moment
         return float(0.5 * (self.square - moment @ np.linalg.solve(scaled, moment)))
 
-    def cost(self):
+    def cost(self) -> float:
         """Minus the log marginal likelihood up to a constant: `nats` and half of the log determinant."""
         unit = 1.0 / np.sqrt(np.maximum(np.diag(self.precision), 1e-300))
         scaled = unit[:, None] * self.precision * unit + 1e-12 * np.eye(len(unit))
         return self.nats() + 0.5 * float(np.linalg.slogdet(scaled)[1] - 2.0 * np.log(unit).sum())
 
 
-def worth(inference, truth, rival, planned):
-    """Sums of the present campaign, the prior among them, and of each run of a planned Case in order of its number.
+def worth(
+    inference: InferenceResult, truth: Answer, rival: Answer, planned: DiagnosisProblem
+) -> tuple[Sums, list[Sums]]:
+    """Sums of the present campaign, the prior among them, and of each run of a planned problem in order of its number.
 
     truth, rival: the answers, each (hypothesis, level) as `Posterior.best_of` gives it.
     """
     (hypothesis, level), (other, other_level) = truth, rival
-    case, evidence = inference.case, inference.evidence
+    problem, evidence = inference.problem, inference.evidence
     terms = hypothesis.terms + other.terms
     # the errors of payload and tilt are the same in both answers
     keys = list(dict.fromkeys((t.effect, t.shape) for t in terms))
-    here, planned = (reachable(replace(one, nuisance_sd={}), inference.state) for one in (case, planned))
+    here, planned = (reachable(replace(one, nuisance_sd={}), inference.state) for one in (problem, planned))
     # both about one state: the linearisation of the evidence is that of the previous fit
     present, there = (one.linearise(inference.state, keys) for one in (here, planned))
     mean, _ = evidence.coefficients(hypothesis.terms, hypothesis.prior_scales[level], level)
-    mean = mean[: sum(spread(case.library[t.effect].coordinates, t.legs).shape[1] for t in hypothesis.terms)]
+    mean = mean[: sum(spread(problem.library[t.effect].coordinates, t.legs).shape[1] for t in hypothesis.terms)]
     made, designs = [], []
     for linear in (present, there):
         none = np.zeros((*linear.data.shape, 0))
-        made.append(np.concatenate([none, *signatures(case.library, linear, hypothesis.terms)], axis=-1) @ mean)
-        designs.append(np.concatenate([linear.base, *signatures(case.library, linear, other.terms)], axis=-1))
+        made.append(np.concatenate([none, *signatures(problem.library, linear, hypothesis.terms)], axis=-1) @ mean)
+        designs.append(np.concatenate([linear.base, *signatures(problem.library, linear, other.terms)], axis=-1))
     penalty = np.zeros(designs[0].shape[-1])
     penalty[there.base.shape[-1] :] = evidence.scales(other.terms, other.prior_scales[other_level]) ** -2.0
-    now = Sums.of(designs[0], made[0], case.noise_mm) + Sums(np.diag(penalty), np.zeros(len(penalty)), 0.0)
+    now = Sums.of(designs[0], made[0], problem.noise_mm) + Sums(np.diag(penalty), np.zeros(len(penalty)), 0.0)
     runs = [planned.run == number for number in np.unique(planned.measurements["run"])]
-    return now, [Sums.of(designs[1][run], made[1][run], case.noise_mm) for run in runs]
+    return now, [Sums.of(designs[1][run], made[1][run], problem.noise_mm) for run in runs]
 
 
-def realized(inference, truth, rival):
+def realized(inference: InferenceResult, truth: Answer, rival: Answer) -> dict[int, float]:
     """By run of the campaign the log Bayes factor between two answers that its readings added to those of all others.
 
     log p(d_r | others, A) - log p(d_r | others, B) in nats, of the linearisation, by number of run; empty for one run.
     """
-    case = reachable(replace(inference.case, nuisance_sd={}), inference.state)
+    problem = reachable(replace(inference.problem, nuisance_sd={}), inference.state)
     answers = [(hypothesis.terms, hypothesis.prior_scales[level]) for hypothesis, level in (truth, rival)]
     keys = list(dict.fromkeys((term.effect, term.shape) for terms, _ in answers for term in terms))
-    linear = case.linearise(inference.state, keys)
+    linear = problem.linearise(inference.state, keys)
     base = np.concatenate([linear.base, *linear.shape_columns.values()], axis=-1)
-    runs = {number: case.run == number for number in pd.unique(case.run)}
+    runs = {number: problem.run == number for number in pd.unique(problem.run)}
     result = dict.fromkeys(runs, 0.0) if len(runs) > 1 else {}
     for sign, (terms, scales) in zip((1.0, -1.0), answers, strict=True):
-        design = np.concatenate([base, *signatures(case.library, linear, terms)], axis=-1)
+        design = np.concatenate([base, *signatures(problem.library, linear, terms)], axis=-1)
         penalty = np.zeros(design.shape[-1])
         penalty[base.shape[-1] :] = inference.evidence.scales(terms, scales) ** -2.0
-        parts = {number: Sums.of(design[rows], linear.data[rows], case.noise_mm) for number, rows in runs.items()}
+        parts = {number: Sums.of(design[rows], linear.data[rows], problem.noise_mm) for number, rows in runs.items()}
         whole = sum(parts.values(), Sums(np.diag(penalty), np.zeros(len(penalty)), 0.0))
         for number in result:
             result[number] += sign * ((whole - parts[number]).cost() - whole.cost())
     return result
 
 
-def reachable(case, state):
-    """A Case without the points at which a state's model, with its effects or without them, has no pose."""
-    left = [case.residual(one) for one in (state, State(state.deviations, {}))]
-    lost = ~np.isfinite(left).all(axis=(0, 2))
-    return case.without(lost) if lost.any() else case
+def reachable(problem: DiagnosisProblem, state: ModelState) -> DiagnosisProblem:
+    """The problem without the points at which a state's model, with its effects or without them, has no pose."""
+    left = [problem.residual(one) for one in (state, ModelState(state.deviations, {}))]
+    lost = np.any([~np.isfinite(one).all(axis=1) for one in left], axis=0)
+    return problem.without(lost) if lost.any() else problem
 
 
-def greedy(now, candidates, most):
+def greedy(now: Sums, candidates: Sequence[Sums], most: int) -> tuple[list[int], float]:
     """Numbers of up to `most` candidates, each the one that adds most nats to those before it, and the nats of all.
 
     now: Sums at the start; candidates: Sums of each.
@@ -134,11 +143,11 @@ class Contest:
     """
 
     separates: str
-    truth: tuple
-    rival: tuple
+    truth: Answer
+    rival: Answer
 
 
-def contests_of(inference, verdict, sizes):
+def contests_of(inference: InferenceResult, verdict: Verdict, sizes: Mapping[str, float]) -> list[Contest]:
     """Up to `OPTIONS.max_advised_rivals` Contests of a Verdict, in the order in which they matter.
 
     First come the members of each group: the set with its most probable one against the set with another one instead.
@@ -147,17 +156,18 @@ def contests_of(inference, verdict, sizes):
     of groups alone: an effect outside of the library cannot be simulated. sizes: by effect the rms in mm of its part of
     the gap.
     """
-    found = {}
-    for pair in _pairs(inference.posterior, verdict, sizes):
-        contest = _contest(*pair) if None not in pair else None
-        if contest:
-            found.setdefault(frozenset(hypothesis.effects for hypothesis, _ in pair), contest)
+    found: dict[frozenset[frozenset[str]], Contest] = {}
+    for favoured, other in _pairs(inference.posterior, verdict, sizes):
+        if favoured and other and (contest := _contest(favoured, other)):
+            found.setdefault(frozenset((favoured[0].effects, other[0].effects)), contest)
         if len(found) == OPTIONS.max_advised_rivals:
             break
     return [*found.values()]
 
 
-def _pairs(posterior, verdict, sizes):
+def _pairs(
+    posterior: Posterior, verdict: Verdict, sizes: Mapping[str, float]
+) -> Iterator[tuple[Answer | None, Answer | None]]:
     """Pairs of answers, the favoured one first; None for one of which there is no hypothesis."""
     effects = frozenset(verdict.effects)
     for group in verdict.groups:
@@ -185,13 +195,15 @@ def _pairs(posterior, verdict, sizes):
         yield posterior.best_of(effects), posterior.best_of(names)
 
 
-def _answer(posterior, effects, within, without):
+def _answer(
+    posterior: Posterior, effects: frozenset[str], within: Collection[str], without: Collection[str]
+) -> Answer | None:
     """The answer of exactly these effects, else the most probable one with all of `within` and none of `without`."""
     found = posterior.best_of(effects)
     return found or posterior.best_where(lambda names: names.issuperset(within) and names.isdisjoint(without))
 
 
-def _uncertain_cause(posterior, verdict, sizes):
+def _uncertain_cause(posterior: Posterior, verdict: Verdict, sizes: Mapping[str, float]) -> str:
     """The cause outside of groups, named or possible, that may act or not and makes most of the gap; "" for none."""
     grouped = {name for group in verdict.groups for name in group.names}
     causes = (*verdict.effects, *(name for name in verdict.possible if name not in ("none", "unexplained")))
@@ -201,7 +213,7 @@ def _uncertain_cause(posterior, verdict, sizes):
     return max(uncertain, key=lambda name: (sizes.get(name, 0.0), uncertain[name], name), default="")
 
 
-def _contest(favoured, other):
+def _contest(favoured: Answer, other: Answer) -> Contest | None:
     """The Contest of two answers, None where they are of the same effects."""
     names = [label(sorted(hypothesis.effects), False) for hypothesis, _ in (favoured, other)]
     if names[0] == names[1]:

@@ -5,15 +5,20 @@ depend on how it is reached. A platform that the drives can orient keeps through
 commanded next to its start. Lengths in mm, speeds in mm/s.
 """
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
+import numpy.typing as npt
 import pandas as pd
 
 from rrru.campaign import measurements as rows
 from rrru.campaign.speed_profile import Trapezoid
+from rrru.diagnosis.aliases import BoolArray, FloatArray
 from rrru.diagnosis.options import OPTIONS
 from rrru.kinematics.inverse import inverse_kinematics
+from rrru.kinematics.robot import Robot
 
 
 @dataclass(frozen=True)
@@ -25,17 +30,17 @@ class Passes:
     read; reads_turns: whether orientations are read.
     """
 
-    start_mm: np.ndarray
-    end_mm: np.ndarray
-    drives: np.ndarray
-    turn: np.ndarray | None = None
-    target: dict | None = None
+    start_mm: FloatArray
+    end_mm: FloatArray
+    drives: FloatArray
+    turn: FloatArray | None = None
+    target: Mapping[str, str | float] | None = None
     reads_turns: bool = False
 
-    def __len__(self):
+    def __len__(self) -> int:
         return len(self.start_mm)
 
-    def some(self, chosen):
+    def some(self, chosen: npt.ArrayLike) -> Self:
         """The passes that are flagged (n,)."""
         chosen = np.asarray(chosen, dtype=bool)
         turn = None if self.turn is None else self.turn[chosen]
@@ -43,25 +48,25 @@ class Passes:
         return replace(self, turn=turn, **{name: values[chosen] for name, values in parts.items()})
 
     @property
-    def rates_per_mm(self):
+    def rates_per_mm(self) -> FloatArray:
         """Largest changes (n, K) of the drives' values for a mm of way."""
         step = OPTIONS.pass_length_mm / (OPTIONS.points_per_pass - 1)
-        return np.abs(np.diff(self.drives, axis=1)).max(axis=1) / step
+        return np.asarray(np.abs(np.diff(self.drives, axis=1)).max(axis=1) / step)
 
-    def within(self, chosen, speed_mm_s, seconds):
+    def within(self, chosen: Sequence[int], speed_mm_s: float, seconds: float) -> int:
         """How many of the passes of some numbers, in this order, are driven in some seconds, with the ways between."""
         way = np.linalg.norm(self.start_mm[chosen[1:]] - self.end_mm[chosen[:-1]], axis=1)
         # a pass speeds up and slows down evenly, and so takes twice as long as at its full speed
         time = (2.0 * OPTIONS.pass_length_mm + np.concatenate([[0.0], way])) / speed_mm_s
         return int((~(np.cumsum(time) > seconds)).sum())
 
-    def listed(self, chosen):
+    def listed(self, chosen: Sequence[int]) -> pd.DataFrame:
         """Rows of `gap_next_poses` of the passes of some numbers, without speed and payload."""
         ends = rows.vector_columns("from", self.start_mm[chosen]) | rows.vector_columns("to", self.end_mm[chosen])
         turn = np.full((len(chosen), 3, 3), np.nan) if self.turn is None else self.turn[chosen]
         return pd.DataFrame({"pose": np.arange(1, len(chosen) + 1), **ends, **rows.turn_columns("command", turn)})
 
-    def commands(self, mechanism, start_s, speed_mm_s, payload_kg):
+    def commands(self, mechanism: Robot, start_s: float, speed_mm_s: float, payload_kg: float) -> pd.DataFrame:
         """Table of the passes, numbered from 1, each a run that begins at one time of a campaign.
 
         The speed is that in the middle, to which each speeds up evenly; times are NaN where it is.
@@ -77,7 +82,7 @@ class Passes:
             "point": np.tile(points_of_pass, count),
         }
         drives = dict(zip(mechanism.parts.columns, self.drives.reshape(len(points), -1).T, strict=True))
-        turn = np.repeat(self.turn, len(points_of_pass), axis=0) if self.reads_turns else None
+        turn = self.turn if self.reads_turns else None
         return pd.DataFrame(numbers).assign(
             trajectory="poses",
             time_s=np.tile(time, count),
@@ -88,11 +93,11 @@ class Passes:
             **rows.vector_columns("measured", points),
             **drives,
             **(self.target or {}),
-            **({} if turn is None else rows.turn_columns("measured", turn)),
+            **({} if turn is None else rows.turn_columns("measured", np.repeat(turn, len(points_of_pass), axis=0))),
         )
 
 
-def passes(measurements, mechanism):
+def passes(measurements: pd.DataFrame, mechanism: Robot) -> Passes:
     """The Passes that a robot can drive in the box about its measured points.
 
     They go from one point of the box towards another, both of Sobol's sequence (Joe and Kuo, SIAM J. Sci. Comput. 30,
@@ -134,18 +139,18 @@ def passes(measurements, mechanism):
     return found.some(smooth & _clear((known, drives), points_of(start, end), reached, mechanism))
 
 
-def points_of(start_mm, end_mm):
+def points_of(start_mm: FloatArray, end_mm: FloatArray) -> FloatArray:
     """Points (n, p, 3) of passes, p of each, from starts to ends (n, 3)."""
     return start_mm[:, None] + np.linspace(0.0, 1.0, OPTIONS.points_per_pass)[:, None] * (end_mm - start_mm)[:, None]
 
 
-def _none(mechanism):
+def _none(mechanism: Robot) -> Passes:
     """No Passes."""
     nothing = np.zeros((0, 3))
     return Passes(nothing, nothing, np.zeros((0, OPTIONS.points_per_pass, len(mechanism.parts.drives))))
 
 
-def _target(used):
+def _target(used: pd.DataFrame) -> dict[str, str | float] | None:
     """Columns of the target on the platform that most rows read, {} where none is named, None where none is there."""
     if "target" not in used:
         return {}
@@ -158,7 +163,9 @@ def _target(used):
     return {name: row[name] for name in names if name in on_robot}
 
 
-def _oriented(start_mm, end_mm, known, mechanism):
+def _oriented(
+    start_mm: FloatArray, end_mm: FloatArray, known: tuple[FloatArray, FloatArray], mechanism: Robot
+) -> tuple[FloatArray, FloatArray]:
     """Orientations (n, 3, 3) of passes, and actuator values (n p, K) within the drives' ranges that reach them.
 
     The orientations are those commanded next to the starts. The solution begins at the drive values of the same pose;
@@ -177,16 +184,18 @@ def _oriented(start_mm, end_mm, known, mechanism):
     return turn[nearest], mechanism.in_range(reached)
 
 
-def _clear(known, points, reached, mechanism):
+def _clear(
+    known: tuple[FloatArray, FloatArray], points: FloatArray, reached: FloatArray, mechanism: Robot
+) -> BoolArray:
     """Passes (n,) whose points (n, p, 3) at drives (n, p, K) are nearly as far from singularities as known ones."""
     flat, drive = points.reshape(-1, 3), reached.reshape(points.shape[0] * points.shape[1], -1)
-    fine = np.isfinite(drive).all(axis=1)
+    fine = np.asarray(np.isfinite(drive).all(axis=1))
     for measure, limit in zip(_measures(mechanism, flat, drive), _measures(mechanism, *known), strict=True):
         fine &= measure > OPTIONS.min_singularity_distance_ratio * np.nanmin(limit)
-    return fine.reshape(points.shape[:2]).all(axis=1)
+    return np.asarray(fine.reshape(points.shape[:2]).all(axis=1))
 
 
-def _measures(mechanism, position_mm, drive):
+def _measures(mechanism: Robot, position_mm: FloatArray, drive: FloatArray) -> FloatArray:
     """Translational and constraint measure (n,) of poses, NaN out of reach."""
     result, fine = np.full((2, len(drive)), np.nan), np.isfinite(drive).all(axis=1)
     result[:, fine] = mechanism.singularities(position_mm[fine], drive[fine])[:2]

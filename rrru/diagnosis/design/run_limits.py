@@ -80,13 +80,13 @@ class RunLimits:
         return not (speed_mm_s > self.speed_mm_s or payload_kg > self.payload_kg or seconds > self.seconds)
 
 
-def run_limits(case: Any, masses: Any, stated: StatedLimits) -> tuple[RunLimits, str]:
-    """The RunLimits of a Case with `rrru.kinematics.dynamics.Masses`, and why no payload is proposed, else "".
+def run_limits(problem: Any, masses: Any, stated: StatedLimits) -> tuple[RunLimits, str]:
+    """The RunLimits of a problem with `rrru.kinematics.dynamics.Masses`, and why no payload is proposed, else "".
 
     A payload that is not stated is what the drives' efforts of the robot's file leave at the campaign's points, else
     `OPTIONS.default_added_payload_kg`; of both no more than a share of what the robot itself moves.
     """
-    robot = case.mechanism
+    robot = problem.mechanism
     limits = RunLimits(
         speed_mm_s=_or_infinite(stated.speed_mm_s),
         seconds=60.0 * _or_infinite(stated.minutes),
@@ -99,14 +99,14 @@ def run_limits(case: Any, masses: Any, stated: StatedLimits) -> tuple[RunLimits,
         return replace(limits, added_kg=stated.payload_kg, payload_kg=stated.payload_kg), ""
     moved = moved_kg(robot, masses)
     plausible = OPTIONS.max_payload_per_moved_mass * moved
-    spare = _spare_kg(case)
+    spare = _spare_kg(problem)
     if np.isfinite(spare):
         added, why = _rounded_down(min(spare, plausible), 1), f"the efforts of its file leave {spare:.2g} kg"
     else:
         fits = plausible >= OPTIONS.default_added_payload_kg
         added, why = (OPTIONS.default_added_payload_kg if fits else 0.0), ""
     if added >= OPTIONS.min_added_payload_kg:
-        driven = float(np.nan_to_num(case.measurements["payload_kg"].to_numpy(dtype=float)).max())
+        driven = float(np.nan_to_num(problem.measurements["payload_kg"].to_numpy(dtype=float)).max())
         return replace(limits, added_kg=added, payload_kg=max(_rounded_down(plausible, 1), driven)), ""
     if not why or plausible < spare:
         why = f"the robot moves {moved:.2g} kg itself" if moved else "the mass of the robot itself is not stated"
@@ -119,16 +119,16 @@ def moved_kg(robot: Any, masses: Any) -> float:
     return float(masses.platform_kg + legs + sum(point_mass.mass_kg for point_mass in robot.point_masses))
 
 
-def _spare_kg(case: Any) -> float:
+def _spare_kg(problem: Any) -> float:
     """Mass in kg that the drives' efforts leave at all points of a campaign, beyond its payload; NaN without efforts.
 
     The load on drive k is linear in the mass m at the tool: |tau_k + m dtau_k/dm| has to stay below its effort.
     """
-    efforts = case.mechanism.effort_limits
+    efforts = problem.mechanism.effort_limits
     if efforts is None:
         return np.nan
-    slope = np.abs(case.motion.slopes[0].drive[case.used])
-    room = OPTIONS.max_effort_share * efforts - np.abs(case.motion.drive_load[case.used])
+    slope = np.abs(problem.motion.slopes[0].drive[problem.used])
+    room = OPTIONS.max_effort_share * efforts - np.abs(problem.motion.drive_load[problem.used])
     with np.errstate(divide="ignore", invalid="ignore"):
         spare = np.where(slope > 0.0, room / slope, np.nan)
     return float(max(np.nanmin(spare), 0.0)) if np.isfinite(spare).any() else np.nan

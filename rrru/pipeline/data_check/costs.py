@@ -11,9 +11,9 @@ from rrru.campaign.driven_path import passes_points
 from rrru.campaign.noise import ENOUGH_REPEATS, read_noise, repeat_noise
 from rrru.diagnosis.determined import poses_needed, require_determined
 from rrru.diagnosis.diagnose import with_wide_bounds
-from rrru.diagnosis.make_problem import make_case
+from rrru.diagnosis.make_problem import make_diagnosis_problem
 from rrru.diagnosis.options import OPTIONS
-from rrru.diagnosis.problem import Case
+from rrru.diagnosis.problem import DiagnosisProblem
 from rrru.diagnosis.settings import GapSettings
 from rrru.errors import FitError, RrruError
 from rrru.kinematics.dynamics import Masses
@@ -43,7 +43,7 @@ def costs(measurements: pd.DataFrame, config: Mapping[str, Any], section: Mappin
         robot = setup.measured_robot(nominal, measurements)
         library = GapSettings.from_config(config["gap"]).library(robot)
         masses = Masses(**parts.masses(config, section))
-        case = make_case(
+        problem = make_diagnosis_problem(
             measurements,
             with_wide_bounds(robot),
             masses,
@@ -55,15 +55,15 @@ def costs(measurements: pd.DataFrame, config: Mapping[str, Any], section: Mappin
     except RrruError as error:
         return [*said, f"no diagnosis: {error}"]
     try:
-        case = require_determined(case)
+        problem = require_determined(problem)
     except FitError as error:
         said.insert(0, f"no diagnosis: {error}")
-    return [*_numbers(nominal, robot), *said, *_untested(case), *_one_way(case, robot.parts.columns), _poses(case)]
+    return [*_numbers(nominal, robot), *said, *_untested(problem), *_one_way(problem, robot.parts.columns), _poses(problem)]
 
 
-def _poses(case: Case) -> str:
+def _poses(problem: DiagnosisProblem) -> str:
     """Sentence on the number of poses that the calibration needs."""
-    rank, needed, read = poses_needed(case)
+    rank, needed, read = poses_needed(problem)
     spare = f"{OPTIONS.min_spare_numbers} degrees of freedom to spare"
     return f"{read} poses are read; their {rank} identifiable parameters need at least {needed}, with {spare}"
 
@@ -94,10 +94,10 @@ def _numbers(nominal: RobotPart, robot: Robot) -> Iterator[str]:
         yield f"not identifiable from these poses: {', '.join(lost[:_SHOWN])}{more}; the calibration fixes them"
 
 
-def _untested(case: Case) -> Iterator[str]:
+def _untested(problem: DiagnosisProblem) -> Iterator[str]:
     """Sentences on effects that are not testable, by the reason."""
     reasons: dict[str, list[str]] = {}
-    for name, reason in case.untestable.items():
+    for name, reason in problem.untestable.items():
         reasons.setdefault(reason, []).append(name)
     for reason, names in reasons.items():
         needs = [remedy for need, remedy in _REMEDIES.items() if need in reason]
@@ -105,12 +105,12 @@ def _untested(case: Case) -> Iterator[str]:
         yield f"not testable: {', '.join(names)} ({reason}){remedy}"
 
 
-def _one_way(case: Case, columns: Iterable[str]) -> Iterator[str]:
+def _one_way(problem: DiagnosisProblem, columns: Iterable[str]) -> Iterator[str]:
     """Sentence on drives, by their columns, that approach every point from the same side."""
-    motion = case.motion
+    motion = problem.motion
     before = motion.path_drive[np.maximum(motion.path_index - 1, 0)]
     known = np.isfinite(motion.last_move).all(axis=1)
-    step = np.where(known[:, None], np.nan_to_num(motion.last_move), motion.drive - before)[case.used]
+    step = np.where(known[:, None], np.nan_to_num(motion.last_move), motion.drive - before)[problem.used]
     up, down = (step > 0.0).mean(axis=0), (step < 0.0).mean(axis=0)
     same = [column for column, one, other in zip(columns, up, down, strict=True) if min(one, other) < _ONE_WAY]
     if same:

@@ -21,9 +21,9 @@ from rrru.calibration.calibrate import calibrate
 from rrru.calibration.campaign_fit import select
 from rrru.campaign import measurements as rows
 from rrru.diagnosis.diagnose import diagnose, with_wide_bounds
-from rrru.diagnosis.make_problem import make_case
-from rrru.diagnosis.problem import Case
-from rrru.diagnosis.state import State
+from rrru.diagnosis.make_problem import make_diagnosis_problem
+from rrru.diagnosis.problem import DiagnosisProblem
+from rrru.diagnosis.state import ModelState
 from rrru.diagnosis.terms import EACH, signatures, variants
 from rrru.seeds import stream
 from rrru.studies.blind_validation.verdicts import NONE, UNEXPLAINED, in_order
@@ -50,7 +50,7 @@ class Campaign:
     of every EffectTerm that the diagnosis tries: effect, shape and legs.
     """
 
-    case: Case
+    problem: DiagnosisProblem
     data: np.ndarray
     base: np.ndarray
     columns: dict
@@ -59,16 +59,16 @@ class Campaign:
     def of(cls, measurements, known, library):
         """The campaign of a measurement table of a MeasuredRobot, linearised about its calibration."""
         mechanism = with_wide_bounds(known.mechanism)
-        case = make_case(measurements, mechanism, known.masses, known.noise_mm, library)
-        calibrated = State(calibrate(select(measurements, mechanism, ["*"])).deviations, {})
+        problem = make_diagnosis_problem(measurements, mechanism, known.masses, known.noise_mm, library)
+        calibrated = ModelState(calibrate(select(measurements, mechanism, ["*"])).deviations, {})
         # the diagnosis searches the waves of effects with many coefficients; these have no fixed signatures
-        effects = {name: effect for name, effect in case.effects.items() if not effect.coordinates.broad}
+        effects = {name: effect for name, effect in problem.effects.items() if not effect.coordinates.broad}
         keys = [(name, k) for name, effect in effects.items() for k in range(len(effect.coordinates.shapes))]
-        linear = case.linearise(calibrated, keys)
+        linear = problem.linearise(calibrated, keys)
         terms = [term for effect in effects.values() for term in variants(effect)]
         made = [linear.data, linear.base, *signatures(effects, linear, terms)]
-        data, base, *columns = (one.reshape(3 * len(case), -1) / case.noise_mm for one in made)
-        return cls(case, data[:, 0], base, dict(zip(terms, columns, strict=True)))
+        data, base, *columns = (one.reshape(3 * len(problem), -1) / problem.noise_mm for one in made)
+        return cls(problem, data[:, 0], base, dict(zip(terms, columns, strict=True)))
 
 
 def _unit(columns, base):
@@ -195,7 +195,7 @@ def gaussian_process(campaign):
     from sklearn.gaussian_process.kernels import RBF, ConstantKernel
     from sklearn.model_selection import GroupKFold
 
-    points, (basis, _) = campaign.case.points, np.linalg.qr(campaign.base)
+    points, (basis, _) = campaign.problem.points, np.linalg.qr(campaign.base)
     left = (campaign.data - basis @ (basis.T @ campaign.data)).reshape(-1, 3)
     seen = np.column_stack([rows.command(points), rows.direction(points), points[list(_NAMED)].to_numpy(dtype=float)])
     seen = seen[:, np.ptp(seen, axis=0) > 0.0]

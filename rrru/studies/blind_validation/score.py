@@ -13,8 +13,8 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from rrru.diagnosis.make_problem import make_case
-from rrru.diagnosis.state import State
+from rrru.diagnosis.make_problem import make_diagnosis_problem
+from rrru.diagnosis.state import ModelState
 from rrru.effects.library import HOLDS
 from rrru.studies.blind_validation.causes import EFFECTS
 from rrru.studies.blind_validation.draw import fresh
@@ -90,8 +90,8 @@ def _right(row, robot, listed, groups):
 def _measured(row, robot, points, about, taken_out):
     """Columns that need the robot itself: limits, true explained fraction of the gap, coverage of its numbers."""
     calibrated, state, effects = state_of(row, about.library)
-    case = _case(points.reset_index(drop=True), about, about.library)
-    closed = true_share(robot, about, case.mechanism, calibrated, (state, effects))
+    problem = _problem(points.reset_index(drop=True), about, about.library)
+    closed = true_share(robot, about, problem.mechanism, calibrated, (state, effects))
     numbers, hold = held(row["numbers"], robot.numbers(about.conditions))
     columns = {"file": robot.file, "cause": robot.cause, "share_closed_true": closed, "numbers": numbers, "held": hold}
     return columns | asdict(_limits(row, robot, points, about, calibrated, taken_out))
@@ -103,8 +103,8 @@ def _limits(row, robot, points, about, calibrated, taken_out):
         return Limits()
     if robot.file:
         return of_displacement(robot.oracle_chi2)
-    case = _case(points.reset_index(drop=True), about, with_truth(about.library, robot.acting))
-    return limits(case, calibrated, robot.acting, _rivals(about.library, taken_out))
+    problem = _problem(points.reset_index(drop=True), about, with_truth(about.library, robot.acting))
+    return limits(problem, calibrated, robot.acting, _rivals(about.library, taken_out))
 
 
 def _rivals(library, taken_out):
@@ -117,27 +117,27 @@ def _rivals(library, taken_out):
     return [name for name in few if name != taken_out and taken_out not in HOLDS.get(name, ())]
 
 
-def _case(measurements, about, library, mechanism=None):
-    """The Case of measurements under Known; the mechanism is by default the one that these measurements observe."""
+def _problem(measurements, about, library, mechanism=None):
+    """The DiagnosisProblem of measurements under Known; the mechanism is by default the one that these observe."""
     conditions = about.conditions
     mechanism = mechanism or conditions.seen(measurements)
-    return make_case(measurements, mechanism, conditions.masses, conditions.noise_mm, library)
+    return make_diagnosis_problem(measurements, mechanism, conditions.masses, conditions.noise_mm, library)
 
 
 def true_share(robot, about, mechanism, calibrated, corrected):
     """Fraction of the true gap that the corrected model explains on new runs; NaN without gap or with a lost pose.
 
-    mechanism: with the calibrated parameters; corrected: the State and its effects by name.
+    mechanism: with the calibrated parameters; corrected: the ModelState and its effects by name.
     """
     state, effects = corrected
     driven = noise_free(fresh(robot, about.conditions), about.conditions) if robot.causes else None
     if driven is None:
         return np.nan
-    case = _case(driven, about, about.library, mechanism)
-    case = replace(case, library=case.library | effects).standing(state)
+    problem = _problem(driven, about, about.library, mechanism)
+    problem = replace(problem, library=problem.library | effects).standing(state)
     # an effect that depends on the direction of approach predicts nothing where that direction is unknown
-    known = case.complete({name for name, _ in state.effects} & case.known.keys())
-    before, after = case.residual(State(calibrated, {}))[known], case.residual(state)[known]
+    known = problem.complete({name for name, _ in state.effects} & problem.known.keys())
+    before, after = problem.residual(ModelState(calibrated, {}))[known], problem.residual(state)[known]
     return float(1.0 - (after**2).sum() / (before**2).sum())
 
 
@@ -168,19 +168,19 @@ def with_truth(library, acting):
     return library | {f"{_TRUE}{one.effect}": one.effect_model for one in acting}
 
 
-def limits(case, deviations, acting, names):
-    """Limits of a campaign from its case, calibrated deviations (p,), acting causes, and names of possible rivals.
+def limits(problem, deviations, acting, names):
+    """Limits of a campaign from its problem, calibrated deviations (p,), acting causes, and names of possible rivals.
 
-    The case's library holds the acting causes too, see `with_truth`.
+    The problem's library holds the acting causes too, see `with_truth`.
     """
     from scipy.stats import chi2
 
     causes = {(f"{_TRUE}{cause.effect}", 0): cause for cause in acting}
-    if not causes or any(name not in case.library for name, _ in causes):
+    if not causes or any(name not in problem.library for name, _ in causes):
         return Limits()
-    known = [name for name in names if name in case.library]
-    rivals = [(name, shape) for name in known for shape in range(len(case.library[name].coordinates.shapes))]
-    reduced = _Reduced(case, deviations, [*causes, *rivals])
+    known = [name for name in names if name in problem.library]
+    rivals = [(name, shape) for name in known for shape in range(len(problem.library[name].coordinates.shapes))]
+    reduced = _Reduced(problem, deviations, [*causes, *rivals])
     true = np.concatenate([reduced.columns[key][:, _free(cause)] for key, cause in causes.items()], axis=1)
     gain = float((reduced.data**2).sum() - _left(true, reduced.data))
     freedom = int(np.linalg.matrix_rank(true))
@@ -208,13 +208,13 @@ def _left(columns, target):
 class _Reduced:
     """Data and columns in units of the noise, calibration projected out, reduced to few rows by QR."""
 
-    def __init__(self, case, deviations, keys):
-        self._library = case.library
-        linear = case.linearise(State(deviations, {}), list(keys))
+    def __init__(self, problem, deviations, keys):
+        self._library = problem.library
+        linear = problem.linearise(ModelState(deviations, {}), list(keys))
         rows = linear.data.size
         base, _ = np.linalg.qr(linear.base.reshape(rows, -1))
         columns = [linear.columns[key].reshape(rows, -1) for key in keys]
-        together = np.concatenate([*columns, linear.data.reshape(rows, 1)], axis=1) / case.noise_mm
+        together = np.concatenate([*columns, linear.data.reshape(rows, 1)], axis=1) / problem.noise_mm
         triangle = np.linalg.qr(together - base @ (base.T @ together), mode="r")
         ends = np.cumsum([column.shape[1] for column in columns])
         self.columns = dict(zip(keys, np.split(triangle[:, :-1], ends[:-1], axis=1), strict=True))

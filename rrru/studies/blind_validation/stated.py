@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pandas as pd
 
-from rrru.diagnosis.state import State
+from rrru.diagnosis.state import ModelState
 
 # between members of a group, as in gap_verdicts
 BETWEEN = " | "
@@ -32,7 +32,7 @@ def stated(robot, diagnosis):
     """
     inference, verdict = diagnosis.inference, diagnosis.decided
     rows = []
-    for name in inference.case.effects:
+    for name in inference.problem.effects:
         group = verdict.group_of(name)
         probability = min(inference.posterior.marginal(name), 1.0)
         rows.append((robot, name, probability, verdict.decision(name), BETWEEN.join(group.names) if group else ""))
@@ -40,7 +40,7 @@ def stated(robot, diagnosis):
 
 
 def state_row(robot, calibrated, state, library, numbers="[]"):
-    """Row of `withheld_states` from calibrated deviations (p,), State of the corrected model and its fitted numbers.
+    """Row of `withheld_states` from calibrated deviations (p,), state of the corrected model and its fitted numbers.
 
     library: effects by name as the diagnosis fitted them.
     """
@@ -59,7 +59,7 @@ def state_row(robot, calibrated, state, library, numbers="[]"):
 
 
 def state_of(row, library):
-    """Calibrated deviations (p,), State of the corrected model and its effects by name from a row of `withheld_states`.
+    """Calibrated deviations (p,), state of the corrected model and its effects by name from a row of `withheld_states`.
 
     library: effects by name; those with waves that a campaign has chosen are made from them.
     """
@@ -69,7 +69,7 @@ def state_of(row, library):
         name: library[name].with_waves(tuple(map(tuple, waves))) if waves else library[name]
         for name, _, _, waves in saved["fitted_effects"]
     }
-    return np.array(saved["calibrated"]), State(np.array(saved["deviations"]), values, saved["shapes"]), effects
+    return np.array(saved["calibrated"]), ModelState(np.array(saved["deviations"]), values, saved["shapes"]), effects
 
 
 def _saved(coordinates, value):

@@ -7,7 +7,7 @@ import pandas as pd
 
 from rrru.campaign import measurements as rows
 from rrru.diagnosis.correction.corrected_model import simulated
-from rrru.diagnosis.make_problem import make_case
+from rrru.diagnosis.make_problem import make_diagnosis_problem
 from rrru.diagnosis.shrink import gap_rms
 from rrru.errors import ConfigError
 from rrru.formats.mjcf_writer import measured_tool_mm
@@ -45,16 +45,16 @@ def errors(fresh, nominal, masses, calibrated, corrected):
     if (tool_mm := measured_tool_mm(corrected)) is not None:
         corrected_section["tool_mm"] = tool_mm.tolist()
     given, other = (make_mechanism(name, part, parameter_set="frame") for part in (section, corrected_section))
-    case = make_case(fresh, given, masses, 1.0, {})
+    problem = make_diagnosis_problem(fresh, given, masses, 1.0, {})
     models = {
-        "given": _driven(case.motion, given, section),
+        "given": _driven(problem.motion, given, section),
         "calibrated": robot.forward(rows.actuators(fresh, robot), deviations, rows.command(fresh)),
-        "corrected": _driven(case.motion, other, corrected_section),
+        "corrected": _driven(problem.motion, other, corrected_section),
     }
     left = {model: rows.measured(fresh) - position for model, position in models.items()}
     # the direction of approach of a drive is unknown at a run's first point and next to a reversal
-    known = ~np.isfinite(case.motion.approach).any(axis=1)
-    used = case.used & known & np.isfinite(list(left.values())).all(axis=(0, 2))
+    known = ~np.isfinite(problem.motion.approach).any(axis=1)
+    used = problem.used & known & np.isfinite(list(left.values())).all(axis=(0, 2))
     named = fresh.loc[used, ["run", "trajectory", "point"]]
     frames = []
     for model, error in left.items():

@@ -65,7 +65,7 @@ def _verdict(studied: Studied) -> dict:
 def _far(studied: Studied) -> str:
     """Held-out readings with far larger residuals, and the rms without them, in words; "" if none."""
     frame, left = studied.measurements, studied.held_out_mm
-    held = (frame["status"] == rows.HELD_OUT).to_numpy() & held_by_robot(studied.case)
+    held = (frame["status"] == rows.HELD_OUT).to_numpy() & held_by_robot(studied.problem)
     far = left > _FAR * np.median(left) if len(left) else np.zeros(0, dtype=bool)
     if not far.any():
         return ""
@@ -89,7 +89,7 @@ def _waves(studied: Studied) -> str:
 
     Each is added to the other causes of the verdict, at their prior scales.
     """
-    library, named = studied.case.library, (_FUNCTION[0], _WAVES[0])
+    library, named = studied.problem.library, (_FUNCTION[0], _WAVES[0])
     if studied.diagnosis is None or not all(name in library for name in named):
         return ""
     inference = studied.diagnosis.inference
@@ -126,7 +126,7 @@ def predicted_share(studied: Studied) -> float:
         return np.nan
     inference = studied.diagnosis.inference
     hypothesis, level = inference.hypothesis, inference.level
-    used = counted(studied.case)
+    used = counted(studied.problem)
     squares = [
         (inference.held_out.predict(terms, strengths, level, uncertain=False).residual_mm[used] ** 2).sum(axis=1).mean()
         for terms, strengths in (((), ()), (hypothesis.terms, hypothesis.prior_scales[level]))
@@ -138,7 +138,7 @@ def _steps(studied: Studied) -> pd.DataFrame:
     """Rows of `real_steps`: the plain models, and the model of the verdict."""
     made = [*studied.steps]
     if studied.diagnosis:
-        made.append(verdict_step(studied.case, studied.state, studied.seconds["gap"]))
+        made.append(verdict_step(studied.problem, studied.state, studied.seconds["gap"]))
     return pd.DataFrame([step.row for step in made]).assign(number=np.arange(1, len(made) + 1))
 
 
@@ -153,15 +153,15 @@ def _parameters(studied: Studied) -> pd.DataFrame:
 
 def _points(studied: Studied) -> pd.DataFrame:
     """Rows of `real_points`."""
-    frame, case = studied.measurements, studied.case
+    frame, problem = studied.measurements, studied.problem
     count = len(frame)
     bare, last = (
-        np.linalg.norm(case.left(state)[:count], axis=1) for state in (studied.step("b").state, studied.state)
+        np.linalg.norm(problem.left(state)[:count], axis=1) for state in (studied.step("b").state, studied.state)
     )
     places = dict(zip(("x_mm", "y_mm", "z_mm"), rows.measured(frame).T, strict=True))
     empty = dict.fromkeys(("bare_x_mm", "bare_y_mm", "bare_z_mm"), np.nan)
     used = np.zeros(count, dtype=bool)
-    used[case.at] = True
+    used[problem.at] = True
     return pd.DataFrame(
         {"row": studied.rows[PLACE], "reading": studied.rows["target"], **places, **empty}
         | {"bare_residual_mm": bare, "residual_mm": last, "used": used}
@@ -171,10 +171,10 @@ def _points(studied: Studied) -> pd.DataFrame:
 
 def _spectrum(studied: Studied) -> pd.DataFrame:
     """Rows of `real_spectrum` of the rotary joints."""
-    case, robot = studied.case, studied.case.mechanism
+    problem, robot = studied.problem, studied.problem.mechanism
     orders, parts = np.arange(1, _SHOWN + 1), []
     found = studied.state.effects.get(_FUNCTION)
-    before, after = (amplitudes(case, state, orders) for state in (studied.step("b").state, studied.state))
+    before, after = (amplitudes(problem, state, orders) for state in (studied.step("b").state, studied.state))
     for number, (drive, unit) in enumerate(zip(robot.parts.drives, robot.parts.units, strict=True)):
         if unit != "rad":
             continue
@@ -183,11 +183,11 @@ def _spectrum(studied: Studied) -> pd.DataFrame:
             errors = studied.diagnosis.tables["gap_parameters"]
             errors = errors.loc[errors["effect"] == _FUNCTION[0], "standard_error"].to_numpy()
             shape = len(robot.parts.drives), -1, 2
-            values = case.library[_FUNCTION[0]].coordinates.to_values(found, {})
+            values = problem.library[_FUNCTION[0]].coordinates.to_values(found, {})
             waves = np.reshape(values, shape)[number, : len(orders)]
             error[: len(waves)] = np.reshape(errors, shape)[number, : len(orders)].mean(axis=1)
             sine[: len(waves)], cosine[: len(waves)] = waves.T
-        reach = float(np.ptp(case.motion.drive[case.used][:, number]))
+        reach = float(np.ptp(problem.motion.drive[problem.used][:, number]))
         parts.append(
             pd.DataFrame(
                 {

@@ -18,10 +18,10 @@ from rrru.campaign.ingest.campaign_file import ingest
 from rrru.campaign.ingest.spec import IngestSpec
 from rrru.diagnosis.diagnose import Diagnosis, MeasuredRobot, diagnose, with_wide_bounds
 from rrru.diagnosis.inference import with_arm
-from rrru.diagnosis.make_problem import make_case
-from rrru.diagnosis.problem import Case
+from rrru.diagnosis.make_problem import make_diagnosis_problem
+from rrru.diagnosis.problem import DiagnosisProblem
 from rrru.diagnosis.settings import GapSettings
-from rrru.diagnosis.state import State
+from rrru.diagnosis.state import ModelState
 from rrru.errors import ConfigError, FitError, IngestError
 from rrru.kinematics.dynamics import Masses
 from rrru.kinematics.robot import Robot
@@ -42,7 +42,7 @@ class Studied:
     """A series with its results.
 
     rows: the sheet; measurements: of all its rows; robot: with the parameters that its training rows observe; plain:
-    the case of the plain models; steps: these models; diagnosis: of the training rows, None where they are too few;
+    the problem of the plain models; steps: these models; diagnosis: of the training rows, None where they are too few;
     held_out_mm (n,): held-out residuals with the named causes, or with the geometry alone without a diagnosis.
     """
 
@@ -50,7 +50,7 @@ class Studied:
     rows: pd.DataFrame
     measurements: pd.DataFrame
     robot: Robot
-    plain: Case
+    plain: DiagnosisProblem
     steps: tuple[Step, ...]
     diagnosis: Diagnosis | None
     held_out_mm: np.ndarray
@@ -62,13 +62,13 @@ class Studied:
         return next(step for step in self.steps if step.model == model)
 
     @property
-    def case(self) -> Case:
-        """The case of the diagnosis, or of the plain models without a diagnosis."""
-        return self.diagnosis.inference.case if self.diagnosis else self.plain
+    def problem(self) -> DiagnosisProblem:
+        """The problem of the diagnosis, or of the plain models without a diagnosis."""
+        return self.diagnosis.inference.problem if self.diagnosis else self.plain
 
     @property
-    def state(self) -> State:
-        """The State of the corrected model, or of the calibrated one without a diagnosis."""
+    def state(self) -> ModelState:
+        """The ModelState of the corrected model, or of the calibrated one without a diagnosis."""
         return self.diagnosis.state if self.diagnosis else self.step("b").state
 
 
@@ -128,7 +128,7 @@ def studied(known: Prepared, settings: GapSettings) -> Studied:
     measured = MeasuredRobot(known.robot, NO_MASSES, known.noise[0], known.series.name, known.noise[1])
     try:
         found = diagnose(known.measurements, measured, settings, details=False)
-        left = held_out_mm(found.inference.case, found.state)
+        left = held_out_mm(found.inference.problem, found.state)
     except FitError as error:
         # the calibration alone is still a result
         found, left = None, next(step for step in made if step.model == "b").held_out_mm
@@ -172,23 +172,25 @@ def _check_joints(series: Series, joints: Mapping[str, str], mechanism: Robot) -
         raise ConfigError(f"{where}: got {', '.join(more)}; allowed: {allowed}")
 
 
-def _reference(known: Prepared) -> tuple[Case, tuple[Step, ...]]:
-    """The case of the reference models of a series, and these models, each fitted to its training rows."""
+def _reference(known: Prepared) -> tuple[DiagnosisProblem, tuple[Step, ...]]:
+    """The problem of the reference models of a series, and these models, each fitted to its training rows."""
     nominal, measurements = with_wide_bounds(known.robot), known.measurements
     turned = rows.has_turns(measurements)
     arm_mm = nominal.angle_arm_mm if turned else np.nan
-    case = make_case(measurements, nominal, NO_MASSES, known.noise[0] or 1.0, library_effects(nominal), True, arm_mm)
+    problem = make_diagnosis_problem(
+        measurements, nominal, NO_MASSES, known.noise[0] or 1.0, library_effects(nominal), True, arm_mm
+    )
     if turned:
-        case = with_arm(case, *known.noise)
-    made = steps(case)
+        problem = with_arm(problem, *known.noise)
+    made = steps(problem)
     if turned:
-        _check_turned(known.series, case, next(step for step in made if step.model == "b").state)
-    return case, made
+        _check_turned(known.series, problem, next(step for step in made if step.model == "b").state)
+    return problem, made
 
 
-def _check_turned(series: Series, case: Case, state: State) -> None:
+def _check_turned(series: Series, problem: DiagnosisProblem, state: ModelState) -> None:
     """Raise ConfigError where the orientations of the calibrated robot disagree with the measured ones."""
-    off_rad = float(np.median(np.linalg.norm(case.residual(state)[~case.positions], axis=1)) / case.arm_mm)
+    off_rad = float(np.median(np.linalg.norm(problem.residual(state)[~problem.positions], axis=1)) / problem.arm_mm)
     if off_rad > _MAX_ORIENTATION_RAD:
         raise ConfigError(
             f"{series.file}: orientations have errors of {off_rad:.2g} rad after calibration; allowed: "

@@ -14,11 +14,11 @@ import pandas as pd
 from rrru.campaign import measurements as rows
 from rrru.diagnosis.diagnose import with_wide_bounds
 from rrru.diagnosis.discrepancy_basis import UNKNOWN
-from rrru.diagnosis.make_problem import make_case
+from rrru.diagnosis.make_problem import make_diagnosis_problem
 from rrru.diagnosis.payload_nuisance import WEIGHT
-from rrru.diagnosis.problem import Case
+from rrru.diagnosis.problem import DiagnosisProblem
 from rrru.diagnosis.settings import GapSettings
-from rrru.diagnosis.state import State
+from rrru.diagnosis.state import ModelState
 from rrru.effects.protocol import Effect, plain_coordinates
 from rrru.errors import FitError
 from rrru.kinematics.robot import Robot
@@ -53,16 +53,16 @@ class Model:
 
 def saved_values(studied: Studied) -> dict[str, Any]:
     """The values of a studied series that `model` needs in addition to its measurements."""
-    case, state = studied.case, studied.state
+    problem, state = studied.problem, studied.state
     effects = {}
     for key, coordinates in state.effects.items():
-        effect = case.library[key[0]]
-        values = effect.coordinates.to_values(coordinates, state.shape(case.library, key))
+        effect = problem.library[key[0]]
+        values = effect.coordinates.to_values(coordinates, state.shape(problem.library, key))
         if effect.name not in UNKNOWN:
             effects[effect.name] = {"values": np.asarray(values).tolist(), "waves": effect.waves}
     return {
-        "arm_mm": float(case.arm_mm),
-        "noise_mm": float(case.noise_mm),
+        "arm_mm": float(problem.arm_mm),
+        "noise_mm": float(problem.noise_mm),
         "geometry": studied.step("b").state.deviations.tolist(),
         "deviations": state.deviations.tolist(),
         "effects": effects,
@@ -99,25 +99,25 @@ def _row(first: Model, second: Model) -> dict:
     """The row of the model of one series on another one."""
     robot = with_wide_bounds(first.robot)
     arm_mm = second.arm_mm if rows.has_turns(second.measurements) else np.nan
-    case = make_case(second.measurements, robot, NO_MASSES, second.noise_mm, {}, True, arm_mm)
+    problem = make_diagnosis_problem(second.measurements, robot, NO_MASSES, second.noise_mm, {}, True, arm_mm)
     effects = {
         name: replace(effect, coordinates=plain_coordinates(effect.parameters, 1.0))
         for name, (effect, _) in first.effects.items()
     }
-    case = replace(case, library=effects | {FRAMES: frames(robot)})
+    problem = replace(problem, library=effects | {FRAMES: frames(robot)})
     values = {(name, 0): values for name, (_, values) in first.effects.items()}
     models = {
-        "frames_rms_mm": State(0.0 * first.geometry, {}),
-        "geometry_rms_mm": State(first.geometry, {}),
-        "causes_rms_mm": State(first.deviations, values, {WEIGHT: first.weight}),
+        "frames_rms_mm": ModelState(0.0 * first.geometry, {}),
+        "geometry_rms_mm": ModelState(first.geometry, {}),
+        "causes_rms_mm": ModelState(first.deviations, values, {WEIGHT: first.weight}),
     }
-    left = {name: _left_mm(case, state) for name, state in models.items()}
+    left = {name: _left_mm(problem, state) for name, state in models.items()}
     return {"campaign": second.series.name, "carried_from": first.series.name, **left}
 
 
-def _left_mm(case: Case, state: State) -> float:
+def _left_mm(problem: DiagnosisProblem, state: ModelState) -> float:
     """Held-out rms of a state with its frames fitted again, NaN where that fit fails."""
     try:
-        return rms(held_out_mm(case, fit_frames(case, state)))
+        return rms(held_out_mm(problem, fit_frames(problem, state)))
     except FitError:
         return np.nan

@@ -9,8 +9,8 @@ import numpy.typing as npt
 
 from rrru.campaign import measurements as rows
 from rrru.campaign.target_registration import PLACE_SD_MM
-from rrru.diagnosis.problem import Case
-from rrru.diagnosis.state import State
+from rrru.diagnosis.problem import DiagnosisProblem
+from rrru.diagnosis.state import ModelState
 from rrru.effects.protocol import Contribution, Effect, plain_coordinates
 from rrru.errors import FitError
 from rrru.estimation.explain import explain_end
@@ -56,41 +56,41 @@ def frame_directions(robot: Robot) -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class FrameObservations:
-    """Readings of a Case as `rrru.estimation.problem.Observations` of the coordinates (c,) of its frames alone."""
+    """Readings of a problem as `rrru.estimation.problem.Observations` of the coordinates (c,) of its frames alone."""
 
-    case: Case
-    state: State
+    problem: DiagnosisProblem
+    state: ModelState
     directions: FloatArray
 
-    def state_at(self, values: FloatArray) -> State:
-        """The State with frames at values (c,)."""
+    def state_at(self, values: FloatArray) -> ModelState:
+        """The ModelState with frames at values (c,)."""
         return replace(self.state, effects=dict(self.state.effects) | {(FRAMES, 0): values})
 
     def residual(self, values: FloatArray, /) -> FloatArray:
         """Readings minus prediction (m, 3) in mm."""
-        return np.asarray(self.case.residual(self.state_at(values)))
+        return np.asarray(self.problem.residual(self.state_at(values)))
 
     def jacobian(self, values: FloatArray, /) -> FloatArray:
         """Its derivative (m, 3, c), exact for frames of any size."""
-        return -self.case.of_rows(self.case.map_of(self.state_at(values)).columns(self.directions))
+        return -self.problem.of_rows(self.problem.map_of(self.state_at(values)).columns(self.directions))
 
     def whiten(self, values: FloatArray) -> FloatArray:
-        """Values (m, 3, ...) in standard deviations of the case's noise."""
-        return values / self.case.noise_mm
+        """Values (m, 3, ...) in standard deviations of the problem's noise."""
+        return values / self.problem.noise_mm
 
 
-def fit_frames(case: Case, state: State) -> State:
-    """A state with frames fitted to the used points of a case whose library has `frames`; all else stays fixed.
+def fit_frames(problem: DiagnosisProblem, state: ModelState) -> ModelState:
+    """A state with frames fitted to the used points of a problem whose library has `frames`; all else stays fixed.
 
     The search starts at the closed-form registration, so that any rotation of the instrument is allowed. Raises
     FitError where it does not converge, naming the parameters that the readings do not determine.
     """
-    numbers = open_numbers(case.mechanism.reads)
-    observations = FrameObservations(case, state, frame_directions(case.mechanism))
+    numbers = open_numbers(problem.mechanism.reads)
+    observations = FrameObservations(problem, state, frame_directions(problem.mechanism))
     sd = [np.inf if one.unit == "rad" else _INSTRUMENT_SD_MM if WORLD in one.twists else PLACE_SD_MM for one in numbers]
     block = Block.of(FRAMES, [one.name for one in numbers], [one.unit for one in numbers], sd)
-    problem = Problem(observations, Parameters((block,)), observations.whiten)
-    estimate = solve(problem, [_start(observations, numbers)])
+    estimation = Problem(observations, Parameters((block,)), observations.whiten)
+    estimate = solve(estimation, [_start(observations, numbers)])
     if not estimate.end.converged:
         raise FitError(explain_end(estimate, "the fit of frame and targets"), estimate)
     return observations.state_at(estimate.values)
@@ -98,13 +98,13 @@ def fit_frames(case: Case, state: State) -> State:
 
 def _start(observations: FrameObservations, numbers: Sequence[Candidate]) -> FloatArray:
     """Coordinates (c,) of the frames by registration of the used points; zero where nothing determines them."""
-    case, nothing = observations.case, np.zeros(len(numbers))
-    if case.mechanism.reads.frame:
-        poses, twists = case.posed(observations.state_at(nothing))
+    problem, nothing = observations.problem, np.zeros(len(numbers))
+    if problem.mechanism.reads.frame:
+        poses, twists = problem.posed(observations.state_at(nothing))
         # twists of effects differ from row to row; their mean is good enough for a start
-        twists = (twists[case.used] if len(twists) > 1 else twists).mean(axis=0, keepdims=True)
-        readings = case.readings or Readings(rows.measured(case.measurements))
+        twists = (twists[problem.used] if len(twists) > 1 else twists).mean(axis=0, keepdims=True)
+        readings = problem.readings or Readings(rows.measured(problem.measurements))
         with suppress(FitError):
-            found = frame_values(case.mechanism, poses.of(case.used), twists, readings.of(case.used))
+            found = frame_values(problem.mechanism, poses.of(problem.used), twists, readings.of(problem.used))
             return np.array([found[one.name] for one in numbers])
     return nothing

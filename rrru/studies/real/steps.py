@@ -13,8 +13,8 @@ import numpy as np
 from rrru.campaign import measurements as rows
 from rrru.diagnosis.calibrate import calibrate
 from rrru.diagnosis.model_fit import fit_named_effects
-from rrru.diagnosis.problem import Case
-from rrru.diagnosis.state import State
+from rrru.diagnosis.problem import DiagnosisProblem
+from rrru.diagnosis.state import ModelState
 from rrru.effects.library import find
 from rrru.effects.protocol import Effect
 from rrru.errors import FitError
@@ -36,14 +36,14 @@ _MODELS = (
 
 @dataclass(frozen=True)
 class Step:
-    """A fitted model: its letter, what it adds in words, its State, number of parameters and of identified ones.
+    """A fitted model: its letter, what it adds in words, its ModelState, number of parameters and of identified ones.
 
     trained_mm, held_out_mm: residual distances (n,) on the rows that it was fitted on, and on held-out rows.
     """
 
     model: str
     adds: str
-    state: State
+    state: ModelState
     parameters: int
     identifiable: int
     seconds: float
@@ -74,47 +74,47 @@ def rms(values: np.ndarray) -> float:
     return float(np.sqrt((values**2).mean())) if len(values) else np.nan
 
 
-def held_out_mm(case: Case, state: State) -> np.ndarray:
+def held_out_mm(problem: DiagnosisProblem, state: ModelState) -> np.ndarray:
     """Residual distances (n,) of a state on held-out rows of targets on the robot; NaN where it has no pose."""
-    held = (case.measurements["status"] == rows.HELD_OUT).to_numpy() & held_by_robot(case)
-    return np.linalg.norm(case.left(state)[: len(held)][held], axis=1)
+    held = (problem.measurements["status"] == rows.HELD_OUT).to_numpy() & held_by_robot(problem)
+    return np.linalg.norm(problem.left(state)[: len(held)][held], axis=1)
 
 
-def trained_mm(case: Case, state: State) -> np.ndarray:
+def trained_mm(problem: DiagnosisProblem, state: ModelState) -> np.ndarray:
     """Residual distances (n,) of a state on the rows of targets on the robot that it was fitted on."""
-    return np.linalg.norm(case.residual(state)[counted(case)], axis=1)
+    return np.linalg.norm(problem.residual(state)[counted(problem)], axis=1)
 
 
-def held_by_robot(case: Case) -> np.ndarray:
-    """Flags (n,) of a case's measurements of targets on the robot, not fixed in the world."""
-    fixed = rows.on_the_world(case.measurements)
-    return np.ones(len(case.measurements), dtype=bool) if fixed is None else ~fixed
+def held_by_robot(problem: DiagnosisProblem) -> np.ndarray:
+    """Flags (n,) of a problem's measurements of targets on the robot, not fixed in the world."""
+    fixed = rows.on_the_world(problem.measurements)
+    return np.ones(len(problem.measurements), dtype=bool) if fixed is None else ~fixed
 
 
-def counted(case: Case) -> np.ndarray:
-    """Flags (m,) of a case's rows that are positions of targets on the robot."""
-    return case.positions & held_by_robot(case)[case.at]
+def counted(problem: DiagnosisProblem) -> np.ndarray:
+    """Flags (m,) of a problem's rows that are positions of targets on the robot."""
+    return problem.positions & held_by_robot(problem)[problem.at]
 
 
-def steps(case: Case) -> tuple[Step, ...]:
+def steps(problem: DiagnosisProblem) -> tuple[Step, ...]:
     """The models in order, without those whose effects the robot does not have or whose fit does not converge.
 
     Raises FitError where the fit of the geometry does not converge.
     """
-    library = dict(case.library) | _extra_effects(case)
-    case, began = replace(case, library=library), time.perf_counter()
-    none = State(np.zeros(len(case.mechanism.parameters)), {})
-    state = fit_frames(case, none)
-    numbers = len(library[FRAMES].coordinates), _identified(case, state, False), time.perf_counter() - began
-    result = [Step("a", "frames", state, *numbers, *_left(case, state))]
+    library = dict(problem.library) | _extra_effects(problem)
+    problem, began = replace(problem, library=library), time.perf_counter()
+    none = ModelState(np.zeros(len(problem.mechanism.parameters)), {})
+    state = fit_frames(problem, none)
+    numbers = len(library[FRAMES].coordinates), _identified(problem, state, False), time.perf_counter() - began
+    result = [Step("a", "frames", state, *numbers, *_left(problem, state))]
     names: tuple[str, ...] = ()
-    calibrated = calibrate(case)
+    calibrated = calibrate(problem)
     for model, adds, effect in _MODELS:
         if effect and effect not in library:
             continue
         began, names = time.perf_counter(), (*names, effect) if effect else names
         try:
-            fit = fit_named_effects(case, names, calibrated)
+            fit = fit_named_effects(problem, names, calibrated)
         except FitError:
             if not effect:
                 raise
@@ -122,32 +122,32 @@ def steps(case: Case) -> tuple[Step, ...]:
             names = names[:-1]
             continue
         numbers = len(fit.estimate.values), fit.estimate.rank, time.perf_counter() - began
-        result.append(Step(model, adds, fit.state, *numbers, *_left(case, fit.state)))
+        result.append(Step(model, adds, fit.state, *numbers, *_left(problem, fit.state)))
     return tuple(result)
 
 
-def verdict_step(case: Case, state: State, seconds: float) -> Step:
+def verdict_step(problem: DiagnosisProblem, state: ModelState, seconds: float) -> Step:
     """The step of a diagnosis' state: calibration and named effects."""
     count = len(state.deviations) + sum(len(values) for values in state.effects.values())
     adds = "+".join(name for name, _ in state.effects) or "nothing"
-    return Step("verdict", adds, state, count, _identified(case, state), seconds, *_left(case, state))
+    return Step("verdict", adds, state, count, _identified(problem, state), seconds, *_left(problem, state))
 
 
-def _identified(case: Case, state: State, calibrated: bool = True) -> int:
+def _identified(problem: DiagnosisProblem, state: ModelState, calibrated: bool = True) -> int:
     """Number of identifiable parameters of a state's effects, and of the calibration where that is fitted."""
-    linear = case.linearise(state, [])
+    linear = problem.linearise(state, [])
     blocks = [linear.base] * calibrated + [linear.columns[key] for key in state.effects]
     return numerical_rank(np.concatenate(blocks, axis=-1).reshape(linear.data.size, -1))
 
 
-def _left(case: Case, state: State) -> tuple[np.ndarray, np.ndarray]:
+def _left(problem: DiagnosisProblem, state: ModelState) -> tuple[np.ndarray, np.ndarray]:
     """`trained_mm` and `held_out_mm` of a state."""
-    return trained_mm(case, state), held_out_mm(case, state)
+    return trained_mm(problem, state), held_out_mm(problem, state)
 
 
-def _extra_effects(case: Case) -> dict[str, Effect]:
+def _extra_effects(problem: DiagnosisProblem) -> dict[str, Effect]:
     """Effects that only these models have, where a robot has sites for them."""
-    result, robot = {FRAMES: frames(case.mechanism)}, case.mechanism
+    result, robot = {FRAMES: frames(problem.mechanism)}, problem.mechanism
     sharp = find("transmission_orders", robot)
     if sharp is not None:
         pairs = tuple((drive, float(order)) for drive in range(len(robot.parts.drives)) for order in (1, 2))

@@ -121,7 +121,7 @@ def test_a_corrected_file_that_is_no_robot_costs_nothing_but_itself(hexapod, tmp
 
 def test_the_corrected_file_alone_stands_where_the_calibrated_robot_does(hexapod):
     inference = hexapod.found.inference
-    robot = inference.case.mechanism
+    robot = inference.problem.mechanism
     actuators = rows.actuators(hexapod.frame, robot)
     expected = robot.forward(actuators, inference.state.deviations, rows.command(hexapod.frame))
     again = from_mjcf(hexapod.file, "plate").forward(actuators, guess_mm=rows.command(hexapod.frame))
@@ -178,7 +178,7 @@ def test_a_file_that_cannot_be_corrected_says_why_and_the_verdict_stands(hexapod
 
 
 def test_standard_errors_of_the_calibration_hold_the_truth(hexapod):
-    mechanism, numbers = hexapod.found.inference.case.mechanism, hexapod.found.tables["gap_parameters"]
+    mechanism, numbers = hexapod.found.inference.problem.mechanism, hexapod.found.tables["gap_parameters"]
     own = numbers[numbers["effect"] == "calibration"].set_index("parameter")
     truth = mechanism.identifiable(hexapod.errors)
     off = np.array([own.loc[key, "value"] - value for key, value in truth.items()])
@@ -333,9 +333,9 @@ def _left(found, kind):
 def test_errors_of_numbers_that_are_fitted_without_effects_hold_what_is_left(arm):
     """What a fit under white noise leaves is larger than the noise by a ratio, and so are the errors."""
     fitted = with_effects(arm.found.inference, ())
-    white = replace(fitted, fit=fit_model(fitted.case, [fitted.calibrated]))
-    left = white.case.residual(white.state)[white.case.positions]
-    ratio = np.sqrt((left**2).mean()) / white.case.noise_mm
+    white = replace(fitted, fit=fit_model(fitted.problem, [fitted.calibrated]))
+    left = white.problem.residual(white.state)[white.problem.positions]
+    ratio = np.sqrt((left**2).mean()) / white.problem.noise_mm
     stated = corrected_file.found_of(white)[0].spread
     errors = corrected_file._with_misfit(white, stated)
     assert ratio > 3.0

@@ -14,12 +14,12 @@ from rrru.diagnosis.design.advise import advise
 from rrru.diagnosis.design.expected_information import Sums, greedy, reachable
 from rrru.diagnosis.design.run_limits import StatedLimits
 from rrru.diagnosis.inference import InferenceResult
-from rrru.diagnosis.make_problem import make_case
+from rrru.diagnosis.make_problem import make_diagnosis_problem
 from rrru.diagnosis.model_fit import fit_model
 from rrru.diagnosis.model_space import explore
 from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.settings import Prior
-from rrru.diagnosis.state import State
+from rrru.diagnosis.state import ModelState
 from rrru.diagnosis.verdict import Verdict, decide
 from rrru.effects.library import find
 from rrru.effects.protocol import Coordinates
@@ -28,7 +28,7 @@ from rrru.parameters import ParameterSet
 from rrru.pipeline.setup import as_measured
 from rrru.robots.hexapod import hexapod
 from tests.diagnosis import arms, hexapod_stops
-from tests.diagnosis.campaigns import EFFECTS, LINES, MASSES, MODEL, case_of, measure, plan_of, strong
+from tests.diagnosis.campaigns import EFFECTS, LINES, MASSES, MODEL, measure, plan_of, problem_of, strong
 
 _NOISE_MM = 0.02
 
@@ -108,12 +108,12 @@ def rivals():
     these alone.
     """
     library = {"drive_compliance": EFFECTS["drive_compliance"], "local_compliance": LocalCompliance()}
-    case = case_of(measure((strong("drive_compliance", 6.0),), plan=plan_of(trajectories=LINES[1:])), library)
-    calibrated = calibrate(case)
-    evidence = case.evidence(case.linearise(calibrated))
+    problem = problem_of(measure((strong("drive_compliance", 6.0),), plan=plan_of(trajectories=LINES[1:])), library)
+    calibrated = calibrate(problem)
+    evidence = problem.evidence(problem.linearise(calibrated))
     posterior = explore(evidence, Prior())
     found = InferenceResult(
-        case, calibrated, calibrated, fit_model(case, [calibrated]), evidence, posterior, *posterior.best()
+        problem, calibrated, calibrated, fit_model(problem, [calibrated]), evidence, posterior, *posterior.best()
     )
     verdict = decide(posterior, library)
     assert {*verdict.effects, *verdict.confounded_with} >= set(library) and verdict.probability < 0.6
@@ -195,12 +195,12 @@ def test_poses_are_advised_for_an_arm_with_the_orientation_to_command():
     own = find("drive_compliance", arms.ARM)
     frame = _arm_stops((arms.active("drive_compliance", 3.0 * own.coordinates.typical * np.ones(arms.DRIVES)),))
     library = {"drive_compliance": own, "compliance_outside": ComplianceOutside()}
-    case = arms.case_of(frame, library=library)
-    calibrated = calibrate(case)
-    evidence = case.evidence(case.linearise(calibrated))
+    problem = arms.problem_of(frame, library=library)
+    calibrated = calibrate(problem)
+    evidence = problem.evidence(problem.linearise(calibrated))
     posterior = explore(evidence, Prior())
     found = InferenceResult(
-        case, calibrated, calibrated, fit_model(case, [calibrated]), evidence, posterior, *posterior.best()
+        problem, calibrated, calibrated, fit_model(problem, [calibrated]), evidence, posterior, *posterior.best()
     )
     rivals = ((frozenset(["compliance_outside"]), False, 0.4),)
     verdict = Verdict(("drive_compliance",), False, 0.5, 0, ("compliance_outside",), rivals)
@@ -226,8 +226,8 @@ def test_of_several_targets_the_one_that_was_read_most_is_read_at_a_pose(tmp_pat
     table = passes.commands(robot, 0.0, 80.0, 0.0)
     assert len(passes) > 20 and set(table["target"]) == {"b"} and not passes.reads_turns
     np.testing.assert_allclose(table[[f"target_{axis}_mm" for axis in "xyz"]].iloc[0], hexapod_stops.PLACES["b"])
-    case = make_case(table, robot, MASSES, hexapod_stops.NOISE_MM, {})
-    assert case.count == len(table) == OPTIONS.points_per_pass * len(passes)
+    problem = make_diagnosis_problem(table, robot, MASSES, hexapod_stops.NOISE_MM, {})
+    assert problem.count == len(table) == OPTIONS.points_per_pass * len(passes)
     on_world = frame.assign(target_on="world")
     assert len(poses.passes(on_world, robot)) == 0
 
@@ -244,20 +244,20 @@ def test_poses_are_as_many_as_the_time_allows():
 
 def test_points_at_which_the_corrected_model_has_no_pose_are_left_out_of_what_runs_are_worth():
     """A leg that is much too short reaches some of the points only."""
-    case = case_of(measure(plan=plan_of(trajectories=LINES[1:])), {"leg_asymmetry": EFFECTS["leg_asymmetry"]})
-    plain = calibrate(case)
+    problem = problem_of(measure(plan=plan_of(trajectories=LINES[1:])), {"leg_asymmetry": EFFECTS["leg_asymmetry"]})
+    plain = calibrate(problem)
     for shift_mm in np.linspace(-50.0, -700.0, 66):
-        state = State(plain.deviations, {("leg_asymmetry", 0): np.tile([0.0, 0.0, shift_mm], 3)})
-        posed = np.isfinite(case.residual(state)).all(axis=1)
+        state = ModelState(plain.deviations, {("leg_asymmetry", 0): np.tile([0.0, 0.0, shift_mm], 3)})
+        posed = np.isfinite(problem.residual(state)).all(axis=1)
         if 0 < posed.sum() < len(posed):
             break
     assert 0 < posed.sum() < len(posed)
     with pytest.raises(FitError, match="no pose"):
-        case.linearise(state, [])
-    reached = reachable(case, state)
+        problem.linearise(state, [])
+    reached = reachable(problem, state)
     assert reached.count == posed.sum()
     assert np.isfinite(reached.linearise(state, []).data).all()
-    assert reachable(case, plain) is case
+    assert reachable(problem, plain) is problem
 
 
 def test_a_box_smaller_than_a_pass_has_none():

@@ -11,12 +11,12 @@ from rrru.campaign.plan import make_plan
 from rrru.campaign.trajectories import Line
 from rrru.diagnosis.design.advise import candidates
 from rrru.diagnosis.design.run_limits import StatedLimits, moved_kg, run_limits
-from rrru.diagnosis.make_problem import make_case
+from rrru.diagnosis.make_problem import make_diagnosis_problem
 from rrru.diagnosis.options import OPTIONS
 from rrru.kinematics.dynamics import Masses
 from rrru.robots.catalogue import make_mechanism
 from rrru.simulation.virtual_robot import VirtualRobot
-from tests.diagnosis.campaigns import FORWARD, LINES, MASSES, case_of, measure, plan_of
+from tests.diagnosis.campaigns import FORWARD, LINES, MASSES, measure, plan_of, problem_of
 from tests.places import ROOT
 
 ARM = make_mechanism("arm6", {"urdf": str(ROOT / "data/models/arm6.urdf")}, parameter_set="zero")
@@ -38,25 +38,25 @@ def reached():
     return table
 
 
-def _arm_case(table, payload_kg=0.0):
-    return make_case(table.assign(payload_kg=payload_kg), ARM, NO_MASSES, 0.02, {})
+def _arm_problem(table, payload_kg=0.0):
+    return make_diagnosis_problem(table.assign(payload_kg=payload_kg), ARM, NO_MASSES, 0.02, {})
 
 
 def _limits(table, **stated):
-    return run_limits(case_of(table, {}), MASSES, StatedLimits(**stated))[0]
+    return run_limits(problem_of(table, {}), MASSES, StatedLimits(**stated))[0]
 
 
 def test_without_limits_a_payload_is_proposed_where_the_robot_moves_at_least_twice_as_much(line):
-    case = case_of(line, {})
-    assert moved_kg(case.mechanism, MASSES) == pytest.approx(3.0 + 3 * 1.2 + 3 * 2.0)
-    limits, why = run_limits(case, MASSES, StatedLimits())
+    problem = problem_of(line, {})
+    assert moved_kg(problem.mechanism, MASSES) == pytest.approx(3.0 + 3 * 1.2 + 3 * 2.0)
+    limits, why = run_limits(problem, MASSES, StatedLimits())
     assert (limits.loaded_kg(0.0), why) == (5.0, "")
-    small, why = run_limits(case, Masses(0.5, 0.3, 0.2), StatedLimits())
+    small, why = run_limits(problem, Masses(0.5, 0.3, 0.2), StatedLimits())
     assert small.loaded_kg(0.0) == 0.0
     assert why == "no run with a payload is proposed, the robot moves 2 kg itself: state limits.payload_kg"
-    unknown, why = run_limits(case, NO_MASSES, StatedLimits())
+    unknown, why = run_limits(problem, NO_MASSES, StatedLimits())
     assert unknown.loaded_kg(0.0) == 0.0 and "the mass of the robot itself is not stated" in why
-    heavy = run_limits(case_of(line.assign(payload_kg=5.0), {}), MASSES, StatedLimits())[0]
+    heavy = run_limits(problem_of(line.assign(payload_kg=5.0), {}), MASSES, StatedLimits())[0]
     assert heavy.loaded_kg(5.0) == 6.0
 
 
@@ -83,20 +83,20 @@ def test_a_run_that_takes_longer_than_allowed_is_not_proposed(line):
 
 
 def test_the_efforts_of_a_file_leave_the_payload_that_is_proposed(reached):
-    limits, why = run_limits(_arm_case(reached), NO_MASSES, StatedLimits())
+    limits, why = run_limits(_arm_problem(reached), NO_MASSES, StatedLimits())
     added = limits.loaded_kg(0.0)
     assert added > 0.0 and why == ""
     allowed = OPTIONS.max_effort_share * ARM.effort_limits
-    assert (np.abs(_arm_case(reached, added).motion.drive_load) <= 1.001 * allowed).all()
+    assert (np.abs(_arm_problem(reached, added).motion.drive_load) <= 1.001 * allowed).all()
     weak = replace(ARM, effort_limits=0.1 * ARM.effort_limits)
-    nothing, why = run_limits(make_case(reached, weak, NO_MASSES, 0.02, {}), NO_MASSES, StatedLimits())
+    nothing, why = run_limits(make_diagnosis_problem(reached, weak, NO_MASSES, 0.02, {}), NO_MASSES, StatedLimits())
     assert nothing.loaded_kg(0.0) == 0.0 and "the efforts of its file leave 0 kg" in why
 
 
 def test_no_drive_exceeds_its_velocity_in_a_fast_run(reached):
     slow = replace(ARM, velocity_limits=0.1 * ARM.velocity_limits)
     for robot, speed in ((ARM, OPTIONS.default_fast_pass_mm_s), (slow, None)):
-        limits, _ = run_limits(make_case(reached, robot, NO_MASSES, 0.02, {}), NO_MASSES, StatedLimits())
+        limits, _ = run_limits(make_diagnosis_problem(reached, robot, NO_MASSES, 0.02, {}), NO_MASSES, StatedLimits())
         choice, table = candidates(reached, limits)
         fast = max(run["speed_mm_s"] for run in choice)
         assert fast == speed if speed else 80.0 < fast < OPTIONS.default_fast_pass_mm_s
@@ -106,7 +106,7 @@ def test_no_drive_exceeds_its_velocity_in_a_fast_run(reached):
     # as fast as the drives allow, to two digits
     assert (rate.max(axis=0) / slow.velocity_limits).max() > 0.2
     stopped = replace(ARM, velocity_limits=0.01 * ARM.velocity_limits)
-    limits, _ = run_limits(make_case(reached, stopped, NO_MASSES, 0.02, {}), NO_MASSES, StatedLimits())
+    limits, _ = run_limits(make_diagnosis_problem(reached, stopped, NO_MASSES, 0.02, {}), NO_MASSES, StatedLimits())
     assert {run["speed_mm_s"] for run in candidates(reached, limits)[0]} == {80.0}
 
 

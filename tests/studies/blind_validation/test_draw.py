@@ -10,7 +10,7 @@ import pytest
 from scipy.stats import chisquare
 
 from rrru.campaign import measurements as rows
-from rrru.diagnosis.make_problem import make_case
+from rrru.diagnosis.make_problem import make_diagnosis_problem
 from rrru.errors import ConfigError
 from rrru.kinematics import singularity
 from rrru.robots.catalogue import make_mechanism
@@ -149,8 +149,10 @@ def test_a_cause_from_outside_is_physical_and_no_effect_of_the_library_is_confou
     np.testing.assert_allclose(moved - still, first, atol=0.02 * np.abs(first).max())
     measurements, _ = campaign.run()
     deviations, _ = _calibrated(measurements)
-    case = make_case(measurements, _MECHANISM, CONDITIONS.masses, 0.02, with_truth(EFFECTS, robot.acting))
-    limit = limits(case, deviations, robot.acting, list(EFFECTS))
+    problem = make_diagnosis_problem(
+        measurements, _MECHANISM, CONDITIONS.masses, 0.02, with_truth(EFFECTS, robot.acting)
+    )
+    limit = limits(problem, deviations, robot.acting, list(EFFECTS))
     # a library that could make this gap would leave 50 once in a million noises
     assert limit.oracle_detects and limit.rival_chi2 > 50.0
 

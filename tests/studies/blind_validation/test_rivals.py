@@ -47,7 +47,7 @@ def _said(campaign, effects, size=8.0):
     data = generator.standard_normal(len(campaign.data)) + campaign.base @ generator.standard_normal(7)
     for name in effects:
         columns = campaign.columns[EffectTerm(name)]
-        typical = campaign.case.library[name].coordinates.typical
+        typical = campaign.problem.library[name].coordinates.typical
         part = columns @ (typical * generator.uniform(1.0, 2.0, len(typical)))
         data = data + size * part / np.sqrt((part**2).mean())
     return replace(campaign, data=data)
@@ -108,7 +108,7 @@ def test_the_spike_and_slab_is_the_sum_over_all_states(campaign, monkeypatch):
 
 
 def test_a_gaussian_process_predicts_what_is_smooth_and_not_what_is_not(campaign):
-    position = campaign.case.motion.position_mm[campaign.case.at]
+    position = campaign.problem.motion.position_mm[campaign.problem.at]
     smooth = 20.0 * np.sin(position[:, [2, 0, 1]] / 120.0)
     generator = np.random.default_rng(5)
     noise = generator.standard_normal(smooth.shape)

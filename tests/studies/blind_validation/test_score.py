@@ -9,8 +9,8 @@ import pytest
 from rrru.calibration.calibrate import calibrate
 from rrru.calibration.campaign_fit import select
 from rrru.campaign import measurements as rows
-from rrru.diagnosis.make_problem import make_case
-from rrru.diagnosis.state import State
+from rrru.diagnosis.make_problem import make_diagnosis_problem
+from rrru.diagnosis.state import ModelState
 from rrru.effects.library import library
 from rrru.errors import ConfigError
 from rrru.studies.blind_validation.causes import EFFECTS
@@ -49,8 +49,8 @@ def robots():
     return result
 
 
-def _case(measurements, library):
-    return make_case(measurements, CONDITIONS.mechanism, CONDITIONS.masses, CONDITIONS.noise_mm, library)
+def _problem(measurements, library):
+    return make_diagnosis_problem(measurements, CONDITIONS.mechanism, CONDITIONS.masses, CONDITIONS.noise_mm, library)
 
 
 def _scored(robots, verdicts, states):
@@ -72,8 +72,8 @@ def _scored(robots, verdicts, states):
 
 def test_a_perfect_diagnosis_gets_everything(robots):
     faulty, _, calibrated = robots["faulty"]
-    perfect = State(np.array(faulty.deviations), {("backlash", 0): np.array(faulty.acting[0].coordinates)})
-    sound = State(robots["sound"][2], {})
+    perfect = ModelState(np.array(faulty.deviations), {("backlash", 0): np.array(faulty.acting[0].coordinates)})
+    sound = ModelState(robots["sound"][2], {})
     verdicts = {"sound": {"effects": "none", "leg": 0}, "faulty": {"effects": "backlash", "leg": 2}}
     scores = _scored(robots, verdicts, {"sound": (robots["sound"][2], sound), "faulty": (calibrated, perfect)})
     assert scores["right"].all() and scores["leg_right"].equals(pd.Series({"sound": np.nan, "faulty": 1.0}))
@@ -84,7 +84,7 @@ def test_a_perfect_diagnosis_gets_everything(robots):
 
 
 def test_a_wrong_diagnosis_gets_nothing(robots):
-    states = {name: (calibrated, State(calibrated, {})) for name, (_, _, calibrated) in robots.items()}
+    states = {name: (calibrated, ModelState(calibrated, {})) for name, (_, _, calibrated) in robots.items()}
     verdicts = {"sound": {"effects": "servo_lag", "leg": 0}, "faulty": {"effects": "backlash+unexplained", "leg": 1}}
     scores = _scored(robots, verdicts, states)
     assert not scores["right"].any() and scores.loc["faulty", "leg_right"] == 0.0
@@ -96,7 +96,7 @@ def test_many_causes_are_scored_by_their_parts_and_have_no_limits(robots, effect
     own = {"faulty": robots["faulty"]}
     verdict = {"check": "many", "effects": effects, "leg": 0}
     calibrated = robots["faulty"][2]
-    scores = _scored(own, {"faulty": verdict}, {"faulty": (calibrated, State(calibrated, {}))})
+    scores = _scored(own, {"faulty": verdict}, {"faulty": (calibrated, ModelState(calibrated, {}))})
     assert scores.loc["faulty", "right"] == right and not scores.loc["faulty", "oracle_detects"]
 
 
@@ -140,7 +140,7 @@ def test_right_is_what_names_exactly_the_truth(truth, verdict, check, right):
 
 
 def test_states_survive_as_text():
-    state = State(
+    state = ModelState(
         np.array([1e-3, -2.5]),
         {
             ("thermal_growth", 2): np.array([1.25e-4]),
@@ -163,15 +163,15 @@ def test_states_survive_as_text():
 
 def test_a_function_of_the_measured_range_survives_as_its_coefficients(robots):
     """Mixtures that a campaign has chosen come back as the library's coefficients, with the same curves."""
-    case, name = _case(robots["sound"][1], _LIBRARY), "drive_error_function"
-    mixed = case.library[name]
+    problem, name = _problem(robots["sound"][1], _LIBRARY), "drive_error_function"
+    mixed = problem.library[name]
     chosen = replace(mixed, coordinates=replace(mixed.coordinates, sized=True))
     values = 1e-5 * np.random.default_rng(4).standard_normal(len(mixed.coordinates))
-    state = State(np.zeros(2), {(name, 0): values})
+    state = ModelState(np.zeros(2), {(name, 0): values})
     _, again, effects = state_of(state_row("a", [0.0], state, {name: chosen}), _LIBRARY)
     assert effects[name] is _LIBRARY[name] and len(again.effects[name, 0]) > len(values)
-    found = _LIBRARY[name].along_drives(case.motion), np.split(again.effects[name, 0], 3)
-    for drive, (own, every, coefficients) in enumerate(zip(mixed.along_drives(case.motion), *found, strict=True), 1):
+    found = _LIBRARY[name].along_drives(problem.motion), np.split(again.effects[name, 0], 3)
+    for drive, (own, every, coefficients) in enumerate(zip(mixed.along_drives(problem.motion), *found, strict=True), 1):
         curve = own @ values[mixed.coordinates.legs == drive]
         np.testing.assert_allclose(every @ coefficients, curve, rtol=0.0, atol=1e-12 * np.abs(curve).max())
 
@@ -180,12 +180,12 @@ def test_the_oracle_alarms_falsely_once_in_a_hundred(robots):
     """On a robot without any effect, tested for one that is not there."""
     sound, faulty = robots["sound"][0], robots["faulty"][0]
     exact = noise_free(sound, CONDITIONS)
-    case = _case(exact, with_truth({}, faulty.acting))
+    problem = _problem(exact, with_truth({}, faulty.acting))
     generator, alarms = np.random.default_rng(1), 0
     for _ in range(300):
         noisy = rows.measured(exact) + CONDITIONS.noise_mm * generator.standard_normal((len(exact), 3))
         named = {f"measured_{axis}_mm": noisy[:, k] for k, axis in enumerate("xyz")}
-        measured = replace(case, measurements=exact.assign(**named))
+        measured = replace(problem, measurements=exact.assign(**named))
         alarms += limits(measured, np.array(sound.deviations), faulty.acting, []).oracle_detects
     # three expected; none, or ten and more, would come once in 20 and once in 900 such tests
     assert 1 <= alarms <= 9
@@ -193,8 +193,8 @@ def test_the_oracle_alarms_falsely_once_in_a_hundred(robots):
 
 def test_the_best_rival_of_backlash_is_lag(robots):
     robot, measurements, calibrated = robots["faulty"]
-    case = _case(measurements, with_truth(EFFECTS, robot.acting))
-    limit = limits(case, calibrated, robot.acting, list(EFFECTS))
+    problem = _problem(measurements, with_truth(EFFECTS, robot.acting))
+    limit = limits(problem, calibrated, robot.acting, list(EFFECTS))
     assert limit.oracle_detects and limit.oracle_freedom == 1
     assert limit.rival == "servo_lag" and limit.rival_chi2 > 30.0
 

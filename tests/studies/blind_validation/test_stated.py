@@ -42,8 +42,8 @@ _VERDICT = Verdict(
     ],
 )
 def test_a_decision_is_that_of_the_verdict(effect, said, group):
-    case = SimpleNamespace(effects={effect: None})
-    inference = SimpleNamespace(case=case, posterior=SimpleNamespace(marginal=lambda _: 0.5))
+    problem = SimpleNamespace(effects={effect: None})
+    inference = SimpleNamespace(problem=problem, posterior=SimpleNamespace(marginal=lambda _: 0.5))
     row = stated("robot", SimpleNamespace(inference=inference, decided=_VERDICT)).iloc[0]
     assert (row["decision"], row["group"]) == (said, group)
 
@@ -54,7 +54,7 @@ def test_a_diagnosis_states_all_effects_that_it_tests_and_their_posterior_probab
     settings = GapSettings(("backlash", "servo_lag"), draws=50)
     result = diagnose(robot.measured(CONDITIONS), known, settings, details=False)
     table = check("withheld_stated", stated("robot", result))
-    assert table["effect"].tolist() == list(result.inference.case.effects)
+    assert table["effect"].tolist() == list(result.inference.problem.effects)
     for row in table.itertuples():
         assert row.probability == pytest.approx(result.inference.posterior.marginal(row.effect))
         assert row.probability < 0.5 and row.decision in ("possible", "excluded")

@@ -16,7 +16,7 @@ from rrru.campaign import measurements as rows
 from rrru.campaign.ingest.campaign_file import IngestSpec, ingest
 from rrru.diagnosis.calibrate import calibrate
 from rrru.diagnosis.diagnose import MeasuredRobot, diagnose
-from rrru.diagnosis.make_problem import make_case
+from rrru.diagnosis.make_problem import make_diagnosis_problem
 from rrru.diagnosis.model_fit import fit_named_effects
 from rrru.diagnosis.settings import GapSettings
 from rrru.effects.library import NAMES, find
@@ -58,7 +58,7 @@ class Torso:
         """ModelFit of the rows for training, and distances (n,) in mm of the held-out ones."""
         robot = self.robot(parameter_set)
         library = {name: find(name, robot) for name in effects}
-        train, test = (make_case(self.of(k), robot, _NO_LOADS, _NOISE_MM, library) for k in (0, 1))
+        train, test = (make_diagnosis_problem(self.of(k), robot, _NO_LOADS, _NOISE_MM, library) for k in (0, 1))
         fit = fit_named_effects(train, effects, calibrate(train))
         return fit, np.linalg.norm(test.left(fit.state), axis=1)
 
@@ -163,8 +163,8 @@ def test_the_diagnosis_names_compliance_and_predicts_the_held_out_rows(torso):
     # the evidence of correlated non-negative coefficients gives 0.11, a product of independent ones gave 0.04
     assert sure[_CROSS] < 0.2 and _CROSS not in found.verdict["effects"]
     assert {_SPRINGS, _BENDING} <= set(found.verdict["effects"].split("+"))
-    case = found.inference.case
-    test = make_case(torso.of(1), case.mechanism, _NO_LOADS, case.noise_mm, case.library)
+    problem = found.inference.problem
+    test = make_diagnosis_problem(torso.of(1), problem.mechanism, _NO_LOADS, problem.noise_mm, problem.library)
     before, after = (
         np.sqrt((test.left(state) ** 2).sum(axis=1).mean()) for state in (found.inference.calibrated, found.state)
     )

@@ -93,7 +93,7 @@ def _diagnosed(table, effects):
 def test_what_remains_is_named(campaign):
     joints, table, held = campaign
     result = _diagnosed(table, (*_LAWS, "read_before_rest"))
-    left = result.inference.case.left(result.state)[held]
+    left = result.inference.problem.left(result.state)[held]
     effects = result.verdict["effects"].split("+")
     assert "drive_compliance" in effects
     assert _rms(left) <= {"cmd": 0.145, "read": 0.35}[joints]
@@ -109,5 +109,5 @@ def test_reflectors_on_the_table_show_the_pedestal_and_four_that_are_others(tmp_
     assert len(wrong) == 4 and all(note.endswith(("where smr2 is", "where smr3 is")) for note in wrong)
     found = _diagnosed(table, (*_LAWS, "pedestal_compliance"))
     assert "pedestal_compliance" in found.verdict["effects"].split("+")
-    left, tool = found.inference.case.left(found.state), table["target"].isin(_TOOL).to_numpy()
+    left, tool = found.inference.problem.left(found.state), table["target"].isin(_TOOL).to_numpy()
     assert _rms(left[held & tool]) <= 0.145

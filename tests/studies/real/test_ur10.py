@@ -51,4 +51,4 @@ def test_no_wave_is_left_of_what_stood_out_before(tables):
 def test_held_out_rows_are_in_no_fit(studied):
     held = (studied.measurements["status"] == "held_out").to_numpy()
     assert held.sum() == len(studied.held_out_mm) > 150
-    assert not np.isin(np.flatnonzero(held), studied.case.at).any()
+    assert not np.isin(np.flatnonzero(held), studied.problem.at).any()

@@ -16,8 +16,8 @@ from scipy.spatial.transform import Rotation
 
 from rrru.campaign import measurements as rows
 from rrru.diagnosis.calibrate import calibrate
-from rrru.diagnosis.make_problem import make_case
-from rrru.diagnosis.state import State
+from rrru.diagnosis.make_problem import make_diagnosis_problem
+from rrru.diagnosis.state import ModelState
 from rrru.studies.blind_validation.sentences import page
 from rrru.studies.blind_validation.sentences.causes import Stops
 from rrru.studies.blind_validation.sentences.own_robots import file_scale
@@ -93,15 +93,15 @@ class Truth:
 def truth_of(draw, run, folder):
     """The Truth of a Draw whose Run was made in a folder."""
     inference = run.diagnosis.inference
-    case, fresh = inference.case, np.repeat(draw.stops.fresh, len(draw.targets))
+    problem, fresh = inference.problem, np.repeat(draw.stops.fresh, len(draw.targets))
     poses, still = draw.poses(), draw.poses(cause=False) if draw.cause else None
     exact = _as_read(draw, run, draw.readings(poses), folder)
-    library = run.library(case.mechanism)
+    library = run.library(problem.mechanism)
     # with the effects as fitted: all readings together could allow more orders of a drive error function
-    whole = make_case(exact, case.mechanism, run.masses, draw.noise_mm, library, True, case.arm_mm)
-    whole = replace(whole, library=whole.library | case.library)
+    whole = make_diagnosis_problem(exact, problem.mechanism, run.masses, draw.noise_mm, library, True, problem.arm_mm)
+    whole = replace(whole, library=whole.library | problem.library)
     count = len(exact)
-    before = whole.left(State(inference.calibrated.deviations, {}))[:count]
+    before = whole.left(ModelState(inference.calibrated.deviations, {}))[:count]
     after = whole.standing(inference.state).left(inference.state)[:count]
     free = exact if still is None else _as_read(draw, run, draw.readings(still), folder)
     geometry, without = _calibrated(draw, run, free[~fresh])
@@ -116,8 +116,8 @@ def truth_of(draw, run, folder):
         strength=_rms(left) / noise_rms,
         chi2=float((left**2).sum() / draw.noise_mm**2),
         numbers={name: draw.cause.numbers(draw.nominal)} if held else {},
-        geometry=dict(zip(case.mechanism.parameters.names, geometry.tolist(), strict=True)),
-        zeros=dict(zip([one.site for one in case.mechanism.parts.drives], draw.zeros.tolist(), strict=True)),
+        geometry=dict(zip(problem.mechanism.parameters.names, geometry.tolist(), strict=True)),
+        zeros=dict(zip([one.site for one in problem.mechanism.parts.drives], draw.zeros.tolist(), strict=True)),
         before_mm=_rms(before[fresh]),
         after_mm=_rms(after[fresh]),
         seen_mm=_rms(seen),
@@ -188,8 +188,10 @@ def _seat(draw, own, rotation):
 
 def _calibrated(draw, run, exact):
     """Deviations (p,) of a plain calibration of exact readings, and its position residuals (n, 3)."""
-    case = run.diagnosis.inference.case
-    own = make_case(exact.reset_index(drop=True), case.mechanism, run.masses, draw.noise_mm, {}, True, case.arm_mm)
+    problem = run.diagnosis.inference.problem
+    own = make_diagnosis_problem(
+        exact.reset_index(drop=True), problem.mechanism, run.masses, draw.noise_mm, {}, True, problem.arm_mm
+    )
     state = calibrate(own)
     return np.asarray(state.deviations), own.left(state)[: len(exact)]
 
