@@ -33,14 +33,14 @@ _STILL_MM, _STILL_RAD = 0.05, 5e-4
 def driven_path(measurements: pd.DataFrame, degree: int = DEGREE) -> tuple[np.ndarray, Course]:
     """`_path_through` the rows of a measurement table; several reflectors measured at one pose are one stop."""
     stop = stops(measurements)
-    path, course = _path_through(measurements[np.diff(stop, prepend=-1) > 0], degree)
+    path, course = _path_through(measurements[_first_rows(stop)], degree)
     return path, {name: values[stop] for name, values in course.items()}
 
 
 def drive_rates(measurements: pd.DataFrame, actuators: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Derivatives (n, K) by the time, first and second, of actuator values (n, K) as `rates` of each stop has them."""
     stop = stops(measurements)
-    first = np.diff(stop, prepend=-1) > 0
+    first = _first_rows(stop)
     return tuple(values[stop] for values in rates(measurements[first], actuators[first]))
 
 
@@ -56,7 +56,7 @@ def smooth_drives(
     """
     if not passes_points(measurements):
         return path
-    first = np.diff(stops(measurements), prepend=-1) > 0
+    first = _first_rows(stops(measurements))
     index, run, result = path_index[first], measurements["run"].to_numpy()[first], path.copy()
     tool, drives = rows.command(measurements)[first], path[index]
     reach, span = np.ptp(tool, axis=0).max(), np.ptp(drives, axis=0)
@@ -82,6 +82,11 @@ def stops(measurements: pd.DataFrame) -> np.ndarray:
     commanded, run = np.nan_to_num(measurements[names].to_numpy(dtype=float)), measurements["run"].to_numpy()
     moved = (np.abs(np.diff(commanded, axis=0)) > still).any(axis=1) | (np.diff(run) != 0)
     return np.cumsum(np.concatenate([[False], moved]))
+
+
+def _first_rows(stop: np.ndarray) -> np.ndarray:
+    """Which rows (n,) are the first ones of their stops (n,)."""
+    return np.diff(stop, prepend=-1) > 0
 
 
 def _path_through(measurements: pd.DataFrame, degree: int) -> tuple[np.ndarray, Course]:

@@ -16,6 +16,7 @@ from rrru.calibration.campaign_fit import CalibrationSettings
 from rrru.campaign import measurements as rows
 from rrru.errors import ConfigError
 from rrru.estimation.intervals import QUANTILE_95
+from rrru.report.worth import gap_squares
 from rrru.store import json_files, tables
 
 METHOD = "least_squares"
@@ -206,8 +207,7 @@ def _sized_parts(side: Side) -> list[dict[str, Any]]:
 def _square(side: Side) -> tuple[float, float]:
     """Mean square of the gap, noise subtracted, and its standard error over the runs."""
     points = side.frames["gap_points"].query("used")
-    size = (points[[f"before_{axis}_mm" for axis in "xyz"]] ** 2).sum(axis=1)
-    mean, error = over_runs(size, points["run"])
+    mean, error = over_runs(gap_squares(points), points["run"])
     return mean - side.verdict["noise_rms_mm"] ** 2, error
 
 

@@ -15,6 +15,7 @@ from rrru.errors import ConfigError
 from rrru.report import cells, compare, page
 from rrru.report.compare import Difference, GapDifference, Side, gap_difference
 from rrru.report.compare_unseen import Unseen, same_points, unseen
+from rrru.store.atomic_write import write_text
 
 _RESULTS = "results"
 # folder and campaign
@@ -54,7 +55,7 @@ def pairs(first: str, second: str) -> list[tuple[_Place, _Place]]:
 def write(first: str, second: str, path: str | Path) -> None:
     """Write the page of two arguments as a whole or not at all."""
     chapters = [_chapter(*pair) for pair in pairs(first, second)]
-    page.save(page.render("compare.html", chapters=chapters, first=first, second=second), path)
+    write_text(page.render("compare.html", chapters=chapters, first=first, second=second), path)
 
 
 def _place(text: str) -> tuple[str, str | None]:

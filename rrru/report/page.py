@@ -161,7 +161,7 @@ def write(folder: str | Path, path: str | Path, reproduced: str, campaign: str |
     chosen = [s for s in contents.SECTIONS if campaign is None or s.key in contents.OF_A_CAMPAIGN]
     parts = [part for part in (_part(results, section) for section in chosen) if part]
     values = {"answers": answers, "parts": parts, "campaign": campaign, "glyphs": results.glyphs}
-    save(render("report.html", **values), path)
+    write_text(render("report.html", **values), path)
 
 
 def render(template: str, **values: Any) -> str:
@@ -171,11 +171,6 @@ def render(template: str, **values: Any) -> str:
         loader=loader, autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
     return environment.get_template(template).render(**values)
-
-
-def save(text: str, path: str | Path) -> None:
-    """Write a page as a whole or not at all."""
-    write_text(text, path)
 
 
 def _part(results: Results, section: contents.Section) -> Part | None:

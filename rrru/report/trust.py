@@ -9,8 +9,8 @@ from rrru.diagnosis.verdict_text import rounded, with_interval
 from rrru.estimation.intervals import QUANTILE_95
 from rrru.report.cells import MINUS
 
-# correlation from which two parameters are not separable, and standard errors to the end of a 95 % interval
-_TOGETHER, _CLEAR = 0.95, QUANTILE_95
+# correlation from which two parameters are not separable
+_TOGETHER = 0.95
 _NO_EFFECTS = ("none", "unexplained")
 COLUMNS = ["campaign", "parameter", "value", "judgement", "with_effects", "true_value", "calibration", "points"]
 
@@ -65,18 +65,18 @@ def _interval(value: float, low: float, high: float, unit: str) -> str | None:
 
 def _judged(row: Mapping[str, Any], tied: Sequence[str]) -> str:
     """What a user may do with one number; tied: parameters that the points see only together with it."""
-    error = _CLEAR * row["standard_error"]
+    half = QUANTILE_95 * row["standard_error"]
     if not row["seen"]:
         return "do not use: the points do not show it"
     if row["at_bound"]:
         return "do not use: the fit ended at a bound"
-    if abs(row["moved"] - row["value"]) > error:
+    if abs(row["moved"] - row["value"]) > half:
         return "biased: the diagnosed effects change it by more than its error"
     if row["unexplained"]:
         return "doubtful: something acts that no effect explains"
     if tied:
         return f"use only together with {', '.join(tied)}"
-    return "use: differs from the drawing" if abs(row["value"]) > error else "use: as drawn, within its error"
+    return "use: differs from the drawing" if abs(row["value"]) > half else "use: as drawn, within its error"
 
 
 def _tied(row: Mapping[str, Any], correlations: pd.DataFrame) -> list[str]:

@@ -7,8 +7,6 @@ import pandas as pd
 from rrru.diagnosis.shrink import gap_rms
 from rrru.diagnosis.verdict_text import rounded
 
-_AXES = "xyz"
-
 
 @dataclass(frozen=True)
 class Worth:
@@ -31,9 +29,14 @@ def worth(errors: pd.DataFrame, points: pd.DataFrame, noise_rms_mm: float, regis
     both = points[points["used"]].merge(before, on=["run", "point"]).dropna(subset=["error_mm"])
     if both.empty:
         return None
-    seen = (both[[f"before_{axis}_mm" for axis in _AXES]] ** 2).sum(axis=1)
-    before_mm, seen_mm = (gap_rms(squares - noise_rms_mm**2) for squares in (both["error_mm"] ** 2, seen))
+    squares = both["error_mm"] ** 2, gap_squares(both)
+    before_mm, seen_mm = (gap_rms(one - noise_rms_mm**2) for one in squares)
     return Worth(len(both), before_mm, seen_mm, registered)
+
+
+def gap_squares(points: pd.DataFrame) -> pd.Series:
+    """Squared distances (n,) in space, in mm^2, that the calibration leaves at rows of `gap_points`."""
+    return (points[[f"before_{axis}_mm" for axis in "xyz"]] ** 2).sum(axis=1)
 
 
 def sentences(found: Worth, left_out_mm: float) -> list[str]:

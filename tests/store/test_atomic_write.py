@@ -8,8 +8,8 @@ from matplotlib.figure import Figure
 
 from rrru.errors import WriteError
 from rrru.figures import style
-from rrru.report import page
 from rrru.store import job, json_files, overlay, tables
+from rrru.store.atomic_write import write_text
 from tests.schemas import TABLES
 
 _ROWS = pd.DataFrame([["a", "x", "p", "q", 0.5]], columns=TABLES["correlations"].names)
@@ -18,7 +18,7 @@ WRITERS = {
     "table.parquet": lambda path: tables.write(TABLES["correlations"], _ROWS, path),
     "facts.json": lambda path: json_files.write({"a": 1.0}, path),
     "overlay.yaml": lambda path: overlay.write({"a": 1.0}, 0.1, path),
-    "report.html": lambda path: page.save("<html></html>", path),
+    "report.html": lambda path: write_text("<html></html>", path),
     "figure.png": lambda path: style.save(Figure(), {"png": path}),
     "figure.pdf": lambda path: style.save(Figure(), {"pdf": path}),
     "figure.svg": lambda path: style.save(Figure(), {"svg": path}),

@@ -94,7 +94,7 @@ def text_cells(data: bytes, problems: Problems, separator: str | None = None, de
     """
     (names, *rows), (_, *lines) = fields(decode(data, problems), separator or ",", problems)
     _require_header(names, rows, separator or ",", problems)
-    return table(names, rows, lines, problems, frozenset(names if decimal == "," else ()))
+    return table(names, rows, lines, problems, decimal)
 
 
 def fields(text: str, separator: str, problems: Problems) -> tuple[list[list[str]], list[int]]:
@@ -119,7 +119,7 @@ def table(
     rows: Sequence[Sequence[Cell]],
     numbers: Iterable[int],
     problems: Problems,
-    commas: frozenset[str] = frozenset(),
+    decimal: str = ".",
 ) -> Cells:
     """Cells of rows of fields below the names of the columns; numbers: of the rows, as an editor shows them."""
     while rows and not any(map(_filled, rows[-1])):
@@ -132,6 +132,7 @@ def table(
     if not complete:
         problems.refuse()
     columns = zip(*(row for _, row in complete), strict=True)
+    commas = frozenset(names if decimal == "," else ())
     return Cells(names, [number for number, _ in complete], dict(zip(names, columns, strict=True)), commas=commas)
 
 

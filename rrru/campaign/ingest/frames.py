@@ -10,7 +10,7 @@ fixed to the world is carried by the robot's frame. Where its place is unknown i
 frame.
 """
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -41,8 +41,14 @@ class Frames:
 
     def select(self, rows: np.ndarray) -> "Frames":
         """The readings of some rows."""
-        parts = {f.name: getattr(self, f.name) for f in fields(self)}
-        return Frames(**{name: part[rows] if isinstance(part, np.ndarray) else part for name, part in parts.items()})
+        return replace(
+            self,
+            seen_mm=self.seen_mm[rows],
+            names=self.names[rows],
+            place_mm=self.place_mm[rows],
+            on_world=self.on_world[rows],
+            right=self.right[rows],
+        )
 
     @property
     def known(self) -> np.ndarray:

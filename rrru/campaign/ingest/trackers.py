@@ -55,7 +55,7 @@ def leica_cells(data: bytes, problems: Problems, separator: str | None = None, d
         allowed = f"a header X [mm], Y [mm], Z [mm]{advice}"
         problems.refuse_now(value=f"no line with X, Y and Z ({first}, ...)", allowed=allowed)
     names, below = _one_clock(rows[at], rows[at + 1 :])
-    cells = table(names, below, lines[at + 1 :], problems, frozenset(names if decimal == "," else ()))
+    cells = table(names, below, lines[at + 1 :], problems, decimal)
     notes = (f"left out: {at} lines above the header",) if at else ()
     return _known(cells, problems, {}, notes)
 
@@ -73,7 +73,7 @@ def spatial_analyzer_cells(data: bytes, problems: Problems, separator: str | Non
     between = separator or separator_of([*body.values()], decimal)
     rows = [_split(line, between) for line in body.values()]
     names, rows, notes = _named(comments, rows, between, problems)
-    cells = table(names, rows, [*body][-len(rows) :], problems, frozenset(names if decimal == "," else ()))
+    cells = table(names, rows, [*body][-len(rows) :], problems, decimal)
     return _known(cells, problems, _stated_unit(comments, problems), notes)
 
 

@@ -24,6 +24,7 @@ from rrru.pipeline.config import RobotPart
 
 # share of points from the other side below which a drive counts as always approached from one side
 _ONE_WAY = 0.02
+_SPARE = f"{OPTIONS.min_spare_numbers} degrees of freedom to spare"
 # most names of parameters that are listed
 _SHOWN = 8
 # remedies by the missing input of an effect
@@ -58,23 +59,27 @@ def costs(measurements: pd.DataFrame, config: Mapping[str, Any], section: Mappin
         problem = require_determined(problem)
     except FitError as error:
         said.insert(0, f"no diagnosis: {error}")
-    return [*_numbers(nominal, robot), *said, *_untested(problem), *_one_way(problem, robot.parts.columns), _poses(problem)]
+    return [
+        *_numbers(nominal, robot),
+        *said,
+        *_untested(problem),
+        *_one_way(problem, robot.parts.columns),
+        _poses(problem),
+    ]
 
 
 def _poses(problem: DiagnosisProblem) -> str:
     """Sentence on the number of poses that the calibration needs."""
     rank, needed, read = poses_needed(problem)
-    spare = f"{OPTIONS.min_spare_numbers} degrees of freedom to spare"
-    return f"{read} poses are read; their {rank} identifiable parameters need at least {needed}, with {spare}"
+    return f"{read} poses are read; their {rank} identifiable parameters need at least {needed}, with {_SPARE}"
 
 
 def enough_poses(mechanism: Robot) -> str:
     """Sentence on the number of poses of one reflector that are enough for all parameters of a robot."""
     count = len(mechanism.parameters)
     poses = -(-(count + OPTIONS.min_spare_numbers) // 3)
-    spare = f"{OPTIONS.min_spare_numbers} degrees of freedom to spare"
     return (
-        f"about {poses} poses of one reflector are enough for the {count} parameters of {mechanism.name}, with {spare}"
+        f"about {poses} poses of one reflector are enough for the {count} parameters of {mechanism.name}, with {_SPARE}"
     )
 
 
@@ -125,16 +130,15 @@ def _passes(measurements: pd.DataFrame, section: Mapping[str, Any]) -> Iterator[
     if not (runs > 1).any():
         yield "no place is measured in two runs: drift is confounded with effects of the place; repeat a run"
     stated = "noise_mm" in section or read_noise(measurements) is not None
-    if not stated and repeat_noise(measurements)[1] < ENOUGH_REPEATS:
-        yield _estimated_noise(measurements)
+    if not stated and (freedom := repeat_noise(measurements)[1]) < ENOUGH_REPEATS:
+        yield _estimated_noise(measurements, freedom // 3)
     if measurements["payload_kg"].nunique() < 2:
         mass = "" if "platform_mass_kg" in section else "; platform_mass_kg is not stated"
         yield f"one payload: compliance shows under the robot's own weight only{mass}"
 
 
-def _estimated_noise(measurements: pd.DataFrame) -> str:
-    """Sentence on what counts as noise where it is neither stated nor determined by repeated points."""
-    repeats = repeat_noise(measurements)[1] // 3
+def _estimated_noise(measurements: pd.DataFrame, repeats: int) -> str:
+    """Sentence on what counts as noise where it is neither stated nor determined by repeats of readings."""
     needed = -(-ENOUGH_REPEATS // 3)
     found = f"{repeats} readings repeat an earlier one (same trajectory, pose, direction, speed and payload)"
     rough = "errors that change from point to point along the runs count as noise"

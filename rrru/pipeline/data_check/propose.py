@@ -33,6 +33,7 @@ _PROBES = 20
 _MIN_REACHED = 0.9
 
 
+# a campaign's section, to which keys are added
 Section: TypeAlias = dict[str, Any]
 
 
