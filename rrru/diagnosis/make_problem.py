@@ -178,15 +178,14 @@ def _course(measurements: pd.DataFrame, mechanism: Robot, actuators: FloatArray)
     At the measured points it has the table's own actuator values.
     """
     path, motion = driven_path(measurements)
-    if mechanism.orients:
-        motion["drive_motion"] = drive_rates(measurements, actuators)
+    rates = drive_rates(measurements, actuators) if mechanism.orients else None
     stated = stated_motion(measurements)
     if stated is not None and stated.stops:
-        course = Course(drive=actuators, path_drive=actuators, stops=True, **motion)
+        course = Course(drive=actuators, path_drive=actuators, stops=True, drive_motion=rates, **motion)
         return _stopping(measurements, mechanism, course, stated.between)
     at_rest = not passes_points(measurements)
     path_drive = _path_drive(measurements, path, (mechanism, actuators, motion["path_index"]))
-    course = Course(drive=actuators, path_drive=path_drive, stops=at_rest, **motion)
+    course = Course(drive=actuators, path_drive=path_drive, stops=at_rest, drive_motion=rates, **motion)
     return course, _unknown_approach(measurements, mechanism, course)
 
 

@@ -9,6 +9,7 @@ from rrru.diagnosis.aliases import FloatArray
 from rrru.diagnosis.discrepancy_basis import Library, TestedEffect
 from rrru.diagnosis.state import LinearizedProblem
 from rrru.effects.protocol import Coordinates, Motion
+from rrru.kinematics.chain import active_sites
 
 # on which legs an effect acts: on each with its own value, on all with one value, or on one leg alone
 EACH, SAME = "each", "same"
@@ -84,5 +85,5 @@ def sites(library: Library, motion: Motion, term: EffectTerm) -> list[str]:
     effect = library[term.effect]
     sizes = effect.coordinates.typical * spread(effect.coordinates, term.legs).sum(axis=1)
     values = effect.coordinates.to_values(sizes, effect.coordinates.shapes[term.shape])
-    active = np.nan_to_num(effect.contribute(motion, values).twists).any(axis=0).any(axis=1)
+    active = active_sites(np.nan_to_num(effect.contribute(motion, values).twists))
     return [name for name, acts in zip(motion.robot.legs.sites, active, strict=True) if acts]

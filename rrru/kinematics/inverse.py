@@ -13,6 +13,7 @@ from rrru.kinematics.parameter_jacobian import TwistMap
 
 if TYPE_CHECKING:
     from rrru.kinematics.general_robot import GeneralRobot
+    from rrru.kinematics.robot import Robot
 
 # positions (n, 3) and orientations (n, 3, 3)
 Place = tuple[FloatArray, FloatArray]
@@ -38,7 +39,7 @@ def drives_from_home(robot: "GeneralRobot", place: Place, twists: FloatArray, ne
 
 
 def inverse_kinematics(
-    robot: "GeneralRobot", place: Place, start: tuple[FloatArray, FloatArray], twists: FloatArray, nearest: bool = True
+    robot: "Robot", place: Place, start: tuple[FloatArray, FloatArray], twists: FloatArray, nearest: bool = True
 ) -> FloatArray:
     """Actuator values (n, K) of a robot at places of its tool, under twists (n or 1, sites, 6); NaN where it has none.
 
@@ -107,10 +108,12 @@ def _steps_from_home(robot: "GeneralRobot", actuators: FloatArray) -> int:
     return max(1, int(np.ceil(np.nanmax(away, initial=0.0) / _LONGEST_STEP)))
 
 
-def _widths(robot: "GeneralRobot") -> FloatArray:
+def _widths(robot: "Robot") -> FloatArray:
     """Width (K,) of each drive's range, at most one turn of a turning drive; a turn where no range is known."""
     turning = np.array(robot.parts.units) == "rad"
-    width = np.minimum(np.ptp(robot.drive_range, axis=1), np.where(turning, 2.0 * np.pi, np.inf))
+    width = np.minimum(
+        np.ptp(np.asarray(robot.drive_range, dtype=float), axis=1), np.where(turning, 2.0 * np.pi, np.inf)
+    )
     turn = np.where(turning, 2.0 * np.pi, 2.0 * np.pi * robot.angle_arm_mm)
     return np.where((width > 0.0) & np.isfinite(width), width, turn)
 

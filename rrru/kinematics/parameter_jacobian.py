@@ -163,13 +163,16 @@ class TwistMap:
         """Pose (m,) of each row of what is read."""
         return np.arange(len(self))
 
-    def move(self, twists: FloatArray) -> FloatArray:
-        """Change (m, 3) of what is read, a position in mm, under small twists (n or 1, sites, 6)."""
-        rows, numbers = self.rows, self.closure.legs.site_numbers
-        result, active = np.zeros((len(rows), 3)), active_sites(np.asarray(twists))
+    def move(self, twists: FloatArray | float) -> FloatArray:
+        """Change (m, 3) of what is read, a position in mm, under small twists (n or 1, sites, 6), or 0 for none."""
+        rows, numbers, values = self.rows, self.closure.legs.site_numbers, np.asarray(twists, dtype=float)
+        result = np.zeros((len(rows), 3))
+        if not values.ndim:
+            return result
+        active = active_sites(values)
         for name in self.closure.legs.sites:
             if active[numbers[name]]:
-                twist = np.broadcast_to(twists[:, numbers[name]], (len(self), 6))[rows]
+                twist = np.broadcast_to(values[:, numbers[name]], (len(self), 6))[rows]
                 result = result + np.einsum("naj,nj->na", self._effect_once(name), twist)
         return result
 

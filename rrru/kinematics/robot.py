@@ -87,6 +87,10 @@ class Robot(ABC):
             """That of the farthest reachable point, or size_mm."""
 
         @property
+        def freedoms(self) -> tuple[int, int]:
+            """Degrees of freedom of position and, in addition, of orientation, of a robot that orients its platform."""
+
+        @property
         def reach_mm(self) -> float:
             """Upper bound of the tool's distance from a leg's foot."""
 

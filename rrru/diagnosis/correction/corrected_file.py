@@ -68,11 +68,12 @@ def found_of(inference: InferenceResult, stated_reflectors: bool = False) -> tup
     moves = [k for k in range(len(sites)) if twists[k].any() or spread[:, k].any()]
     numbers, count = parameter_rows(inference), len(problem.mechanism.parts.drives)
     loads = np.nan_to_num(np.abs(problem.motion.drive_load)).max(axis=0)
+    x, y, z = problem.mechanism.tool_mm
     found = Found(
         {sites[k]: twists[k] for k in moves},
         {sites[k]: spread[:, k] for k in moves},
         _places(problem, stated_reflectors),
-        tuple(problem.mechanism.tool_mm),
+        (x, y, z),
         _of_drives(numbers, *_COMPLIANCE, count),
         _of_drives(numbers, *_BACKLASH, count),
         dict(enumerate(loads.tolist())),

@@ -114,8 +114,8 @@ def _one_way(problem: DiagnosisProblem, columns: Iterable[str]) -> Iterator[str]
     """Sentence on drives, by their columns, that approach every point from the same side."""
     motion = problem.motion
     before = motion.path_drive[np.maximum(motion.path_index - 1, 0)]
-    known = np.isfinite(motion.last_move).all(axis=1)
-    step = np.where(known[:, None], np.nan_to_num(motion.last_move), motion.drive - before)[problem.used]
+    known = np.isfinite(motion.last_move).all(axis=1, keepdims=True)
+    step = np.where(known, np.nan_to_num(motion.last_move), motion.drive - before)[problem.used]
     up, down = (step > 0.0).mean(axis=0), (step < 0.0).mean(axis=0)
     same = [column for column, one, other in zip(columns, up, down, strict=True) if min(one, other) < _ONE_WAY]
     if same:
