@@ -36,7 +36,7 @@ _BAD_SHARE, _JUMP_FACTOR, _LOOSEST_MM = 0.1, 2.0, 1.5
 # A bad end point pulls at its neighbour by a third, a bad neighbour at the end by as much as it is off itself.
 _END_PREFERENCE = 1.5
 
-# a deviation of which less than this is left beside errors of the geometry is theirs
+# a deviation of which less than this remains with errors of the geometry is made by them
 _EXPLAINED = 0.5
 # parameters of a rigid motion; numbers that a fit of the geometry must have to spare
 _RIGID, _LEAST_SPARE = 6, 20

@@ -36,15 +36,13 @@ PAPERS["A"] = {
 }
 
 
-def twin_settings(state, *keys):
-    """Settings of a job that searches for the twin; state: its file or folder below the results' `twin`."""
-    return {
-        "nominal": parts.nominal(config, REPRODUCED),
-        "virtual": parts.virtual(config, REPRODUCED),
-        "workers": 2,
-        "state": f"{RESULTS}/twin/{state}",
-        **reads(*keys, "twin"),
-    }
+# settings of all jobs that search for the twin
+TWIN_PARTS = {
+    "nominal": parts.nominal(config, REPRODUCED),
+    "virtual": parts.virtual(config, REPRODUCED),
+    "workers": 2,
+    **reads("twin"),
+}
 
 
 # all values and seeds of one swept setting in one interpretation of the paper
@@ -122,7 +120,7 @@ rule twin_search:
         f"{RESULTS}/logs/twin.log",
     threads: 2
     params:
-        settings=twin_settings("state.json", "reproduce.line_calibration"),
+        settings={**TWIN_PARTS, "state": f"{RESULTS}/twin/state.json", **reads("reproduce.line_calibration")},
         code=code("twin"),
     script:
         "../../scripts/twin.py"
@@ -135,7 +133,7 @@ rule twin_hypotheses:
         f"{RESULTS}/logs/twin_hypotheses.log",
     threads: 2
     params:
-        settings=twin_settings("hypotheses"),
+        settings={**TWIN_PARTS, "state": f"{RESULTS}/twin/hypotheses"},
         code=code("twin_hypotheses"),
     script:
         "../../scripts/twin_hypotheses.py"
@@ -148,7 +146,7 @@ rule twin_tradeoff:
         f"{RESULTS}/logs/twin_tradeoff.log",
     threads: 2
     params:
-        settings=twin_settings("tradeoff", "reproduce.line_calibration"),
+        settings={**TWIN_PARTS, "state": f"{RESULTS}/twin/tradeoff", **reads("reproduce.line_calibration")},
         code=code("twin_tradeoff"),
     script:
         "../../scripts/twin_tradeoff.py"
