@@ -83,8 +83,7 @@ def _of_unknown_masses(compliances: Sequence[Parameter], weights: LinkWeights) -
 
     def deflected(motion: Motion, values: FloatArray) -> Contribution:
         """Changes of the drives' values under the parameters."""
-        parts = zip(functions(motion), np.split(values, np.cumsum(sizes)[:-1]), strict=True)
-        return motion.at_drives(np.stack([f @ own for f, own in parts], axis=1))
+        return motion.at_drive_functions(functions(motion), np.split(values, np.cumsum(sizes)[:-1]))
 
     parameter_set = ParameterSet(tuple(parameters))
     coordinates = plain_coordinates(parameter_set, np.array(typical))

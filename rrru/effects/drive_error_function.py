@@ -71,7 +71,7 @@ def for_robot(robot: Robot) -> Effect:
     none = np.zeros(len(parameters), dtype=int)
     coordinates = Coordinates(
         spectra[0],
-        np.array([p.leg for p in parameters]),
+        parameters.legs,
         none > 0,
         lambda values, _: values,
         spectra=spectra,
@@ -86,7 +86,7 @@ def for_robot(robot: Robot) -> Effect:
     def err(motion: Motion, values: FloatArray) -> Contribution:
         """Changes of the actuator values under coefficients (K times 2 orders,) in their units."""
         by_drive = np.reshape(values, (len(units), -1))
-        return motion.at_drives(np.stack([f @ c for f, c in zip(functions(motion), by_drive, strict=True)], axis=1))
+        return motion.at_drive_functions(functions(motion), by_drive)
 
     return Effect("drive_error_function", parameters, coordinates, err, along_drives=functions, of_drive_value=True)
 

@@ -118,6 +118,10 @@ class Motion:
         """Contribution of changes (n, K) of the actuator values, in their units."""
         return self._at_values(self.robot.parts.drives, changes)
 
+    def at_drive_functions(self, functions: Iterable[FloatArray], values: Iterable[FloatArray]) -> Contribution:
+        """Contribution of functions (n, c_k) by drive under values (c_k,) by drive: changes of the actuator values."""
+        return self.at_drives(np.stack([f @ own for f, own in zip(functions, values, strict=True)], axis=1))
+
     def at_followers(self, changes: FloatArray) -> Contribution:
         """Contribution of changes (n, f) of the joints that follow drives, in their units."""
         return self._at_values(self.robot.parts.followers, changes)

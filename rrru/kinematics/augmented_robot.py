@@ -11,7 +11,15 @@ from functools import cached_property
 import numpy as np
 
 from rrru.kinematics.arrays import BoolArray, FloatArray
-from rrru.kinematics.base_parameters import Candidate, MeasurementConfig, choose, direction, offered, open_numbers
+from rrru.kinematics.base_parameters import (
+    Candidate,
+    MeasurementConfig,
+    choose,
+    column_scale,
+    direction,
+    offered,
+    open_numbers,
+)
 from rrru.kinematics.legs import Legs
 from rrru.kinematics.readings import Readings
 from rrru.kinematics.robot import Robot
@@ -64,13 +72,11 @@ class AugmentedRobot(Robot):
     ) -> "AugmentedRobot":
         """The robot with the added parameters that are identifiable at poses (n, K), (n, 3) with Readings."""
         complete = replace(self, added=self._added)
-        poses = complete.solve(actuators, position_mm)
-        seen = poses.closed
-        at = complete.map(actuators[seen], poses.of(seen), readings=readings.of(seen) if readings else None)
+        at = complete.map_of_closed(actuators, position_mm, readings)
         columns, count = at.columns(complete.directions), len(self.robot.parameters)
         columns = columns.reshape(-1, columns.shape[2])
         basis, _ = np.linalg.qr(columns[:, :count])
-        scale = np.array([1.0 if added.unit == "mm" else 1.0 / self.angle_arm_mm for added in self._added])
+        scale = column_scale(self._added, self.angle_arm_mm)
         chosen, _ = choose(columns[:, count:] * scale, [True] * len(scale), _LEFT_OF_DATA, basis)
         return replace(self, added=tuple(self._added[k] for k in chosen))
 

@@ -23,6 +23,7 @@ from rrru.kinematics.base_parameters import (
     MeasurementConfig,
     candidates_of,
     choose,
+    column_scale,
     direction,
     in_words,
     offered,
@@ -91,12 +92,11 @@ class GeneralRobot(Robot):
         if self.parameter_set != "full" and not self.sample:
             return wanted, {}
         actuators, position, readings = self.sample or (*self._workspace(), None)
-        poses, least = self.solve(actuators, position), _LEFT_OF_DATA if self.sample else _LEFT
-        seen = poses.closed
-        at = self.map(actuators[seen], poses.of(seen), readings=readings.of(seen) if readings else None)
+        least = _LEFT_OF_DATA if self.sample else _LEFT
+        at = self.map_of_closed(actuators, position, readings)
         candidates = self.candidates
         columns = at.columns(np.stack([direction(self.legs, candidate) for candidate in candidates], axis=-1))
-        sizes = np.array([1.0 if candidate.unit == "mm" else 1.0 / self.angle_arm_mm for candidate in candidates])
+        sizes = column_scale(candidates, self.angle_arm_mm)
         names = {candidate.name for candidate in wanted}
         names &= set(self.among or names)
         allowed = [candidate.name in names for candidate in candidates]
@@ -305,8 +305,7 @@ class GeneralRobot(Robot):
     def freedoms(self) -> tuple[int, int]:
         """Degrees of freedom of the tool's position, and in addition of the platform's orientation, by the drives."""
         actuators, position = (part[:10] for part in self._workspace())
-        poses = self.solve(actuators, position)
-        at = self.map(actuators[poses.closed], poses.of(poses.closed))
+        at = self.map_of_closed(actuators, position)
         position_rank = np.linalg.matrix_rank(at.drive_response, rtol=_SEEN).max()
         turn = self.angle_arm_mm * at.platform[:, 3:] @ at.drive_counts
         pose_rank = np.linalg.matrix_rank(np.concatenate([at.drive_response, turn], axis=1), rtol=_SEEN).max()

@@ -224,7 +224,7 @@ class TwistMap:
         lengths_mm (K,): by which each drive's value is multiplied to be comparable: the characteristic length of drives
         that turn, 1 of those that slide (Angeles, Fundamentals of Robotic Mechanical Systems, section 5.8).
         """
-        size = _singular_values(self.drive_response / lengths_mm)
+        size = singular_values(self.drive_response / lengths_mm)
         return size[:, -1] / size[:, 0]
 
     def constraint_measures(self, arm_mm: float) -> tuple[FloatArray, FloatArray]:
@@ -236,8 +236,8 @@ class TwistMap:
         legs = [_orthonormal(_about(one, self.point_mm) / ([1.0] * 3 + [arm_mm] * 3)) for one in groups]
         rows = np.concatenate(legs, axis=1)
         if rows.shape[1] == 6 and all(leg.bar for leg in self.closure.legs.legs):
-            return _singular_values(rows)[:, -1], np.linalg.det(rows)
-        values = _singular_values(rows)
+            return singular_values(rows)[:, -1], np.linalg.det(rows)
+        values = singular_values(rows)
         return values[:, -1], values.prod(axis=1)
 
     @cached_property
@@ -280,7 +280,7 @@ def _orthonormal(rows: FloatArray) -> FloatArray:
     return result
 
 
-def _singular_values(matrices: FloatArray) -> FloatArray:
+def singular_values(matrices: FloatArray) -> FloatArray:
     """Singular values (n, k) of matrices, NaN where one is not known."""
     result = np.full((len(matrices), min(matrices.shape[1:])), np.nan)
     known = np.isfinite(matrices).all(axis=(1, 2))

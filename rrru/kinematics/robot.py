@@ -241,6 +241,14 @@ class Robot(ABC):
         twists = self.twists(deviations)
         return self.map(actuators, self.solve(actuators, position_mm, twists), twists)
 
+    def map_of_closed(
+        self, actuators: FloatArray, position_mm: FloatArray, readings: Readings | None = None
+    ) -> TwistMap:
+        """The nominal TwistMap at those of the actuator values (n, K) at which the legs close near positions (n, 3)."""
+        poses = self.solve(actuators, position_mm)
+        seen = poses.closed
+        return self.map(actuators[seen], poses.of(seen), readings=readings.of(seen) if readings else None)
+
     def guess(self, actuators: FloatArray, targets: Sequence[str] | None = None) -> FloatArray:
         """Positions (n, 3) from which to search poses at actuator values (n, K): the home position.
 

@@ -11,6 +11,7 @@ from typing import Protocol
 import numpy as np
 
 from rrru.kinematics.arrays import FloatArray
+from rrru.kinematics.parameter_jacobian import singular_values
 
 
 class ThreeLegged(Protocol):
@@ -21,9 +22,7 @@ class ThreeLegged(Protocol):
     ) -> tuple[FloatArray, FloatArray]:
         """Derivatives of the closures by the position (n, 3, 3) and by the legs' numbers (n, 3, k)."""
 
-    def constraint_moments(
-        self, position_mm: FloatArray, actuators: FloatArray, deviations: FloatArray | None = None, /
-    ) -> FloatArray:
+    def constraint_moments(self, position_mm: FloatArray, actuators: FloatArray, /) -> FloatArray:
         """Unit directions (n, 3 legs, 3) about which each leg keeps the platform from turning."""
 
 
@@ -39,27 +38,14 @@ def translational_measure(
     mechanism: ThreeLegged, position_mm: FloatArray, actuators: FloatArray, deviations: FloatArray | None = None
 ) -> FloatArray:
     """Smallest singular value (n,) of the legs' forces; 0 where the platform can move with all drives locked."""
-    return _smallest_singular_value(leg_forces(mechanism, position_mm, actuators, deviations))
+    return singular_values(leg_forces(mechanism, position_mm, actuators, deviations))[:, -1]
 
 
-def constraint_measure(
-    mechanism: ThreeLegged, position_mm: FloatArray, actuators: FloatArray, deviations: FloatArray | None = None
-) -> FloatArray:
+def constraint_measure(mechanism: ThreeLegged, position_mm: FloatArray, actuators: FloatArray) -> FloatArray:
     """Smallest singular value (n,) of the constraint moments; 0 where the platform can turn with all drives locked."""
-    return _smallest_singular_value(mechanism.constraint_moments(position_mm, actuators, deviations))
+    return singular_values(mechanism.constraint_moments(position_mm, actuators))[:, -1]
 
 
-def constraint_determinant(
-    mechanism: ThreeLegged, position_mm: FloatArray, actuators: FloatArray, deviations: FloatArray | None = None
-) -> FloatArray:
+def constraint_determinant(mechanism: ThreeLegged, position_mm: FloatArray, actuators: FloatArray) -> FloatArray:
     """Determinant (n,) of the constraint moments; its sign changes across a constraint singularity."""
-    return np.asarray(np.linalg.det(mechanism.constraint_moments(position_mm, actuators, deviations)))
-
-
-def _smallest_singular_value(matrices: FloatArray) -> FloatArray:
-    """Smallest singular value (n,) of (n, 3, 3) matrices, NaN where the pose cannot be reached."""
-    result = np.full(len(matrices), np.nan)
-    fine = np.isfinite(matrices).all(axis=(1, 2))
-    if fine.any():
-        result[fine] = np.linalg.svd(matrices[fine], compute_uv=False)[:, -1]
-    return result
+    return np.asarray(np.linalg.det(mechanism.constraint_moments(position_mm, actuators)))

@@ -119,7 +119,7 @@ class Delta(Tripod):
         """Numbers of the legs (3, 4) without deviations."""
         return np.tile([0.0, self.l1_mm, self.l2_mm, self.a_mm], (3, 1))
 
-    def inverse_of_legs(self, position_mm: FloatArray, legs: FloatArray, sign: float = 1.0) -> FloatArray:
+    def inverse_of_legs(self, position_mm: FloatArray, legs: FloatArray, sign: float) -> FloatArray:
         """Drive angles (n, 3) in rad under leg numbers (3, 4), knees outwards for sign 1; NaN where out of reach."""
         position = points(position_mm)
         u, v = self.radial_tangential(position)

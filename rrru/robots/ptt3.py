@@ -131,7 +131,7 @@ class Ptt3(Tripod):
         """Numbers of the legs (3, 6) without deviations."""
         return np.tile([0.0, self.L_mm, self.R_mm - self.r_mm, 0.0, 0.0, 0.0], (3, 1))
 
-    def inverse_of_legs(self, position_mm: FloatArray, legs: FloatArray, sign: float = 1.0) -> FloatArray:
+    def inverse_of_legs(self, position_mm: FloatArray, legs: FloatArray, sign: float) -> FloatArray:
         """Slider positions (n, 3) in mm under leg numbers (3, 6) by the root of that sign (eq. 2); NaN out of reach."""
         outward, _, rail = self._directions(legs)
         w = legs[:, 2, None] * outward - points(position_mm)[:, None, :]

@@ -36,7 +36,7 @@ class Tripod(ThreeLegs):
     LINK: ClassVar[int] = 0
 
     @abstractmethod
-    def inverse_of_legs(self, position_mm: FloatArray, legs: FloatArray, sign: float = 1.0) -> FloatArray:
+    def inverse_of_legs(self, position_mm: FloatArray, legs: FloatArray, sign: float) -> FloatArray:
         """Actuator values (n, 3) under leg numbers (3, k), in the assembly of a sign; NaN where out of reach."""
 
     @abstractmethod

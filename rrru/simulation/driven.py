@@ -10,7 +10,7 @@ from rrru.campaign.measurements import turn_columns, vector_columns
 from rrru.campaign.plan import Plan
 from rrru.effects.motion import Course, make_motion
 from rrru.effects.protocol import Motion
-from rrru.kinematics.arrays import FloatArray
+from rrru.kinematics.arrays import BoolArray, FloatArray
 from rrru.kinematics.chain import Poses
 from rrru.kinematics.dynamics import Masses
 from rrru.kinematics.robot import Robot
@@ -58,8 +58,8 @@ class DrivenRobot(ABC):
         """
         commands, target = plan.commands(self.mechanism), plan.targets()
         motion = self.motion(plan, controller or self.mechanism.inverse)
-        poses, twists, turned = self._where(motion, target)
-        solved, row = poses.closed & (turned <= self.rotation_limit_rad), sees.rows(len(target))
+        poses, twists, turned, solved = self._where(motion, target)
+        row = sees.rows(len(target))
         lost = non_repeatability(generator, len(target))[row]
         position = np.where(solved[row, None], sees.positions(self.mechanism, poses, twists), np.nan)
         position = position + self.non_repeatability_mm * lost
@@ -102,15 +102,14 @@ class DrivenRobot(ABC):
         target (n, 3): the commanded positions by default. NaN where the legs do not close near the target or the
         platform would turn by more than the limit.
         """
-        poses, twists, turned = self._where(motion, motion.position_mm if target is None else target)
-        solved = poses.closed & (turned <= self.rotation_limit_rad)
+        poses, twists, turned, solved = self._where(motion, motion.position_mm if target is None else target)
         return np.where(solved[:, None], self.mechanism.measured(poses, twists), np.nan), turned
 
-    def _where(self, motion: Motion, target: FloatArray) -> tuple[Poses, FloatArray, FloatArray]:
-        """The result of `posed`, and sizes (n,) of the platform's rotation."""
+    def _where(self, motion: Motion, target: FloatArray) -> tuple[Poses, FloatArray, FloatArray, BoolArray]:
+        """The result of `posed`, sizes (n,) of the platform's rotation, and which poses (n,) count as solved."""
         poses, twists = self.posed(motion, target)
-        turned = poses.turned_from(self.mechanism.near(target, motion.drive).turn)
-        return poses, twists, np.linalg.norm(turned, axis=1)
+        turned = np.linalg.norm(poses.turned_from(self.mechanism.near(target, motion.drive).turn), axis=1)
+        return poses, twists, turned, poses.closed & (turned <= self.rotation_limit_rad)
 
 
 def non_repeatability(generator: np.random.Generator, count: int) -> FloatArray:

@@ -36,7 +36,7 @@ def _zero_offset(edit: Edit, site: str, size: float) -> None:
 
 def _placement(edit: Edit, site: str, size: float) -> None:
     """A length or a seat is off, along or about a direction: mm or rad."""
-    edit.shifts[_place(edit, site)] = _of_direction(edit, site, size)
+    edit.shifts[_place(edit, site)] = _of_direction(site, size)
 
 
 def _warming(edit: Edit, site: str, size: float) -> None:
@@ -44,7 +44,7 @@ def _warming(edit: Edit, site: str, size: float) -> None:
     if site == "time_s":
         edit.warming_s = _positive("warming.time_s", size)
     else:
-        edit.grows[_place(edit, site)] = _of_direction(edit, site, size)
+        edit.grows[_place(edit, site)] = _of_direction(site, size)
 
 
 def _actuator_stiffness(edit: Edit, site: str, size: float) -> None:
@@ -235,7 +235,7 @@ def _place(edit: Edit, site: str) -> Place:
     return "body", *_body_place(edit, site)
 
 
-def _of_direction(edit: Edit, site: str, size: float) -> float:
+def _of_direction(site: str, size: float) -> float:
     """Size in m or rad of a site that ends in a direction."""
     return size if site.rpartition(".")[2].startswith("r") else size / MM
 

@@ -93,7 +93,7 @@ def read(file: str | Path, platform: str, tool_mm: Sequence[float], drives: Sequ
     spec.compiler.fusestatic = False
     _name_all(spec)
     nominal = spec.compile()
-    qpos = nominal.key_qpos[0] if nominal.nkey else nominal.qpos0
+    qpos = home_qpos(nominal)
     home = {nominal.joint(j).name: _values(nominal, j, qpos) for j in range(nominal.njnt)}
     for key in list(spec.keys):
         spec.delete(key)
@@ -127,6 +127,11 @@ def _name_all(spec: mujoco.MjSpec) -> None:
     for kind, every in (("equality", spec.equalities), ("actuator", spec.actuators)):
         for number, element in enumerate(every, 1):
             element.name = element.name or f"{kind} {number}"
+
+
+def home_qpos(model: mujoco.MjModel) -> FloatArray:
+    """Values of qpos at home: of the first keyframe, else of the reference configuration."""
+    return np.asarray(model.key_qpos[0] if model.nkey else model.qpos0)
 
 
 def _values(model: mujoco.MjModel, joint: int, qpos: FloatArray) -> FloatArray:

@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 import pandas as pd
 
-from rrru.simulation.mujoco_model import MM
+from rrru.simulation.mujoco_model import MM, home_qpos
 
 _ROUND = {int(mujoco.mjtGeom.mjGEOM_CAPSULE), int(mujoco.mjtGeom.mjGEOM_CYLINDER)}
 
@@ -18,7 +18,7 @@ def solids(file: str | Path) -> pd.DataFrame:
     """
     model = mujoco.MjModel.from_xml_path(str(file))
     data = mujoco.MjData(model)
-    data.qpos[:] = model.key_qpos[0] if model.nkey else model.qpos0
+    data.qpos[:] = home_qpos(model)
     mujoco.mj_kinematics(model, data)
     over = np.array([1.0, -1.0, -1.0]) if model.opt.gravity[2] > 0.0 else np.ones(3)
     rows = []
