@@ -82,7 +82,13 @@ def _confounded_with(robot: Robot, zero: str, least: float) -> str:
 
 
 def payload_notes(inference: InferenceResult) -> Iterator[str]:
-    """Sentences on significant errors of payload and tilt that the readings determine."""
+    """Sentences on significant errors of payload and tilt that the readings determine, and on those at a bound."""
+    for name, unit, value, _ in _nuisance_at_bound(inference):
+        what = "mass at the platform" if unit == "kg" else f"tilt of the base about {name[-1]}"
+        yield (
+            f"the fitted error of the {what} is at its bound, {value:.3g} {unit}: stated loads and deflections "
+            "contradict each other, and sizes of compliances are not reliable; check the stated masses and payloads"
+        )
     for name, unit, value, interval, determined in _significant_nuisance(inference):
         if determined:
             size = _sized(value, interval, unit)
@@ -106,6 +112,15 @@ def mass_notes(problem: DiagnosisProblem) -> Iterator[str]:
     untested = {name for name, why in problem.untestable.items() if why == UNLOADED}
     if problem.massless and (untested or any(is_compliance(effect) for effect in problem.effects.values())):
         yield MASSES_UNKNOWN
+
+
+def _nuisance_at_bound(inference: InferenceResult) -> list[tuple[str, str, float, float]]:
+    """Errors of payload and tilt that end at a bound, each (name, unit, value, standard error)."""
+    estimate, weight = inference.fit.estimate, inference.fit.weight
+    if not weight or inference.problem.massless:
+        return []
+    held = estimate.at_bound[estimate.parameters.places[WEIGHT]]
+    return [one for one, bound in zip(weight, held, strict=True) if bound]
 
 
 def _significant_nuisance(inference: InferenceResult) -> Iterator[tuple[str, str, float, FloatArray, bool]]:

@@ -342,11 +342,13 @@ def _of_group(group: Facts, with_shares: bool) -> str:
 def _sure(facts: Facts, groups: Mapping[str, Facts]) -> list[str]:
     """How probable each cause is, and the answer as a whole."""
     single = [effect for effect in facts["effects"] if effect["name"] not in groups]
-    exactly = probability(facts["probability"])
+    sure = probability(facts["probability"])
     if not single:
-        return [f"Probability of this answer: {exactly}."]
+        return [f"Probability of this answer: {sure}."]
+    # `rrru.diagnosis.verdict.decide` counts sets of more causes, too, where something is unexplained
+    answer = "this answer, alone or with further causes" if facts["unexplained"] else "exactly this answer"
     listed = ", ".join(f"{readable(one['name'])} {probability(one['probability'])}" for one in single)
-    return [f"Probability that it acts: {listed}. Probability of exactly this answer: {exactly}."]
+    return [f"Probability that it acts: {listed}. Probability of {answer}: {sure}."]
 
 
 def _shares_are_determined(facts: Facts) -> bool:

@@ -143,6 +143,13 @@ def test_a_mass_that_is_not_stated_is_said_where_two_loads_were_driven():
     assert low < 0.5 * _PLATFORM_KG < high < 1.2 * low and not undetermined
 
 
+def test_a_mass_that_ends_at_its_bound_is_said():
+    """Its standard error is not known there; a twentieth of the stated mass is on the platform."""
+    weight, notes, _ = _weighed((campaigns.FORWARD, campaigns.LOADED), 20.0 * _PLATFORM_KG)
+    (note,) = (note for note in notes if "mass" in note)
+    assert f"is at its bound, {weight[0][2]:.3g} kg" in note and "check the stated masses and payloads" in note
+
+
 def test_with_one_load_a_mass_and_a_compliance_are_confounded():
     weight, notes, (note,) = _weighed((campaigns.FORWARD, campaigns.REVERSE), 0.5 * _PLATFORM_KG)
     assert weight[0][2] > 3.0 * weight[0][3]

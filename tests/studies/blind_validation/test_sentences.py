@@ -246,6 +246,7 @@ _ALWAYS = {"no commanded positions": True} | dict.fromkeys(
         *(
             "no cause is named",
             "what to check",
+            "the payload is at a bound",
             "the mass is not as stated",
             "the base is tilted",
             "the noise is smaller",

@@ -56,7 +56,7 @@ _SENTENCES = {
     "a group of causes": r"One of these acts, and these data cannot tell which: (?P<listed>.*) "
     rf"\(probability that one does: {_P}\).*",
     "probability of this answer": rf"(?:Probability that it acts: (?P<each>.*)\. )?Probability of (?:exactly )?this "
-    rf"answer: {_P}\.",
+    rf"answer(?:, alone or with further causes)?: {_P}\.",
     "it does not repeat": rf"(?:{_SHARE}|An undetermined share|Some of it) does not repeat from pass to pass.*",
     "it is random error": rf"(?:{_SHARE}|An undetermined share|Some of it) is random error above the stated noise.*",
     "what is left with it": rf"With (?:it|them) in the simulator the residual error at left-out points is {_X} mm; "
@@ -78,6 +78,7 @@ _NOTES = {
     "a zero is confounded": r"(?P<site>[^:]+): zero and .* are not separately identifiable, .*",
     "a zero is not determined": r"(?P<site>[^:]+): zero is not determined by the readings, .*",
     "without it a number would be off": rf"without (?P<name>\w+) (?P<parameter>\S+) would be off by {_X} .*",
+    "the payload is at a bound": r"the fitted error of the (?:mass|tilt) .* is at its bound, .*",
     "the mass is not as stated": rf"the platform carries {_X} kg{_ENDS} more than stated",
     "the base is tilted": rf"the base is tilted by {_X} rad{_ENDS} about \w, the configuration assumes 0",
     "a weight is confounded": r"(?:a mass at the platform|a tilt of the base about \w) and a compliance are not .*",
