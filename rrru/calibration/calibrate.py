@@ -12,6 +12,7 @@ from typing import Any, Self
 import numpy as np
 import numpy.typing as npt
 
+from rrru.arrays import FloatArray
 from rrru.calibration.identifiability import Identifiability, analyse, analyse_columns, parameter_scale
 from rrru.campaign.outliers import robust_sd
 from rrru.errors import FitError
@@ -24,8 +25,6 @@ from rrru.estimation.solver import SolverOptions, estimate_at, solve
 from rrru.estimation.starts import starting_values
 from rrru.kinematics.readings import Readings
 from rrru.parameters import ParameterSet
-
-FloatArray = npt.NDArray[np.float64]
 
 # a nanometre, below what any instrument resolves: with this noise the prior decides what the readings do not determine
 _VANISHING_SD_MM = 1e-6

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial import cKDTree
 
+from rrru.arrays import BoolArray, FloatArray
 from rrru.campaign.outliers import off_neighbours, robust_sd
 from rrru.errors import FitError
 from rrru.estimation.discrepancy import Discrepancy
@@ -19,9 +20,6 @@ from rrru.estimation.evidence import MarginalLikelihood, marginalize
 from rrru.estimation.observations.lengths import Lengths
 from rrru.estimation.parameters import Block, Parameters
 from rrru.estimation.solver import SolverOptions, solve
-
-FloatArray = npt.NDArray[np.float64]
-BoolArray = npt.NDArray[np.bool_]
 
 _MAX_SCREENINGS = 10
 # starts are compared over so many rows; they and robust fits, which only judge readings that are far off, are searched

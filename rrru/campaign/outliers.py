@@ -15,8 +15,7 @@ own scale (Hampel, Journal of the American Statistical Association 69, 1974). Th
 import numpy as np
 import numpy.typing as npt
 
-FloatArray = npt.NDArray[np.float64]
-BoolArray = npt.NDArray[np.bool_]
+from rrru.arrays import BoolArray, FloatArray
 
 # medians for standard normal numbers: of one's absolute value, of the length of a vector of three
 NORMAL_MEDIAN, MEDIAN_OF_LENGTH = 0.6745, 1.5382

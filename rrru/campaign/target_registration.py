@@ -18,11 +18,9 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
+from rrru.arrays import FloatArray, IntArray
 from rrru.campaign.registration_kernel import descend
 from rrru.errors import FitError
-
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int_]
 
 # prior standard deviation of an unknown place about the tool: no target is farther from the tool than a few metres
 PLACE_SD_MM = 1000.0

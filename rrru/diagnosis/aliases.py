@@ -6,9 +6,8 @@ from typing import Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-FloatArray: TypeAlias = npt.NDArray[np.float64]
-BoolArray: TypeAlias = npt.NDArray[np.bool_]
-IntArray: TypeAlias = npt.NDArray[np.int_]
+from rrru.arrays import FloatArray, IntArray
+
 ObjectArray: TypeAlias = npt.NDArray[np.object_]
 
 # an effect in one of its shapes: its name, and the shape's number

@@ -22,10 +22,10 @@ import numba
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from rrru.arrays import BoolArray, FloatArray, IntArray
 from rrru.campaign.driven_path import STEPS
 from rrru.campaign.outliers import NORMAL_MEDIAN
 from rrru.campaign.stated_motion import DRIVES, TOOL
-from rrru.diagnosis.aliases import BoolArray, FloatArray, IntArray
 from rrru.diagnosis.discrepancy_basis import TestedEffect
 from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.state import ModelState

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 from scipy.special import ndtr
 
-from rrru.diagnosis.aliases import BoolArray, FloatArray
+from rrru.arrays import BoolArray, FloatArray
 from rrru.diagnosis.discrepancy_basis import UNKNOWN
 from rrru.diagnosis.evidence import ModelEvidence
 from rrru.diagnosis.hypothesis import Hypothesis

@@ -10,7 +10,8 @@ import numpy as np
 import pandas as pd
 from scipy.special import chdtri, chndtrinc
 
-from rrru.diagnosis.aliases import FloatArray, Row
+from rrru.arrays import FloatArray
+from rrru.diagnosis.aliases import Row
 from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.problem import DiagnosisProblem
 from rrru.diagnosis.state import LinearizedProblem

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from rrru.diagnosis.aliases import BoolArray, FloatArray
+from rrru.arrays import BoolArray, FloatArray
 from rrru.diagnosis.approach_direction import has_direction
 from rrru.diagnosis.calibrate import observations_of
 from rrru.diagnosis.options import OPTIONS

@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from rrru.arrays import FloatArray
 from rrru.campaign import measurements as rows
-from rrru.diagnosis.aliases import FloatArray, Row
+from rrru.diagnosis.aliases import Row
 from rrru.diagnosis.budget import budget
 from rrru.diagnosis.design.advise import Advice, advise
 from rrru.diagnosis.design.run_limits import StatedLimits

@@ -12,7 +12,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.polynomial import chebyshev
 
-from rrru.diagnosis.aliases import FloatArray
+from rrru.arrays import FloatArray
 from rrru.effects.protocol import Contribution, Coordinates, Effect, Motion
 from rrru.kinematics.legs import WORLD
 from rrru.kinematics.robot import Robot

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 
-from rrru.diagnosis.aliases import FloatArray
+from rrru.arrays import FloatArray
 from rrru.diagnosis.inference import InferenceResult
 from rrru.diagnosis.model_fit import ModelFit
 from rrru.diagnosis.problem import DiagnosisProblem

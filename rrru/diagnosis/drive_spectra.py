@@ -23,7 +23,8 @@ from scipy.linalg import block_diag, qr
 from scipy.optimize import minimize_scalar
 from scipy.special import gammaln
 
-from rrru.diagnosis.aliases import EffectKey, FloatArray
+from rrru.arrays import FloatArray
+from rrru.diagnosis.aliases import EffectKey
 from rrru.diagnosis.discrepancy_basis import UNKNOWN
 from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.problem import DiagnosisProblem

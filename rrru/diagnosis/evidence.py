@@ -29,8 +29,9 @@ from typing import Concatenate, ParamSpec, TypeVar
 
 import numpy as np
 
+from rrru.arrays import BoolArray, FloatArray, IntArray
 from rrru.cache import Latest
-from rrru.diagnosis.aliases import BoolArray, FloatArray, Grams, IntArray
+from rrru.diagnosis.aliases import Grams
 from rrru.diagnosis.discrepancy_basis import Library
 from rrru.diagnosis.evidence_kernels import log_sum_exp
 from rrru.diagnosis.hypothesis import Hypothesis

@@ -11,7 +11,7 @@ import numba
 import numpy as np
 from scipy import special
 
-from rrru.diagnosis.aliases import BoolArray, FloatArray, IntArray
+from rrru.arrays import BoolArray, FloatArray, IntArray
 
 # standard deviations above zero from which a condition is certain: its probability is 1 - 3e-5
 _CERTAIN_Z = 4.0

@@ -8,8 +8,8 @@ from itertools import pairwise
 import numpy as np
 from scipy.linalg import cho_solve, solve_triangular
 
+from rrru.arrays import FloatArray, IntArray
 from rrru.campaign.noise import along_runs
-from rrru.diagnosis.aliases import FloatArray, IntArray
 from rrru.diagnosis.evidence import ModelEvidence
 from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.problem import DiagnosisProblem

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TypeAlias
 
-from rrru.diagnosis.aliases import FloatArray
+from rrru.arrays import FloatArray
 from rrru.diagnosis.terms import EffectTerm
 
 

@@ -6,9 +6,10 @@ from functools import cached_property
 
 import numpy as np
 
+from rrru.arrays import FloatArray
 from rrru.campaign import noise
 from rrru.campaign.outliers import isolated
-from rrru.diagnosis.aliases import EffectKey, FloatArray
+from rrru.diagnosis.aliases import EffectKey
 from rrru.diagnosis.calibrate import calibrate, origin
 from rrru.diagnosis.detectability import with_seen
 from rrru.diagnosis.discrepancy_basis import UNKNOWN, Library

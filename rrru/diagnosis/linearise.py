@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rrru.diagnosis.aliases import EffectKey, FloatArray, WeightStep
+from rrru.arrays import FloatArray
+from rrru.diagnosis.aliases import EffectKey, WeightStep
 from rrru.diagnosis.state import LinearizedProblem, ModelState
 from rrru.effects.protocol import is_compliant
 from rrru.errors import FitError

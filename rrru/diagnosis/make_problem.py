@@ -10,6 +10,7 @@ from functools import partial
 import numpy as np
 import pandas as pd
 
+from rrru.arrays import BoolArray, FloatArray, IntArray
 from rrru.campaign import measurements as rows
 from rrru.campaign.driven_path import (
     DEGREE,
@@ -21,7 +22,6 @@ from rrru.campaign.driven_path import (
     stops,
 )
 from rrru.campaign.stated_motion import stated_motion
-from rrru.diagnosis.aliases import BoolArray, FloatArray, IntArray
 from rrru.diagnosis.approach_direction import at_reversals, paths_between_stops, rest_widths, undetermined_senses
 from rrru.diagnosis.discrepancy_basis import TestedEffect, unknown_functions
 from rrru.diagnosis.drive_spectra import resolved

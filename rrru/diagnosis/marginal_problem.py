@@ -20,8 +20,9 @@ from scipy.linalg import cho_solve, solve_triangular
 from scipy.linalg.lapack import dposv
 from scipy.optimize import nnls
 
+from rrru.arrays import BoolArray, FloatArray, IntArray
 from rrru.diagnosis import evidence_kernels as kernels
-from rrru.diagnosis.aliases import BoolArray, FloatArray, Grams, IntArray
+from rrru.diagnosis.aliases import Grams
 
 
 class Prior(NamedTuple):

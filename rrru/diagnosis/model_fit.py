@@ -14,8 +14,9 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
+from rrru.arrays import FloatArray
 from rrru.cache import last_cached
-from rrru.diagnosis.aliases import EffectKey, FloatArray
+from rrru.diagnosis.aliases import EffectKey
 from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.payload_nuisance import WEIGHT
 from rrru.diagnosis.problem import GEOMETRY, DiagnosisProblem

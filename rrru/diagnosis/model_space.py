@@ -28,7 +28,7 @@ from functools import cached_property
 import numpy as np
 from scipy.linalg import solve_triangular
 
-from rrru.diagnosis.aliases import BoolArray, FloatArray, IntArray
+from rrru.arrays import BoolArray, FloatArray, IntArray
 from rrru.diagnosis.discrepancy_basis import UNKNOWN
 from rrru.diagnosis.evidence import PRIOR_SCALES, ModelEvidence, averaged
 from rrru.diagnosis.evidence_kernels import log_evidence_of_blocks, log_sum_exp

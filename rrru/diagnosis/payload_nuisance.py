@@ -25,7 +25,8 @@ from itertools import product
 
 import numpy as np
 
-from rrru.diagnosis.aliases import FloatArray, Grams, IntArray, WeightStep
+from rrru.arrays import FloatArray, IntArray
+from rrru.diagnosis.aliases import Grams, WeightStep
 from rrru.diagnosis.evidence_kernels import log_sum_exp
 from rrru.diagnosis.marginal_problem import MarginalProblem, gained, posterior_covariance, posterior_mean
 from rrru.diagnosis.options import OPTIONS

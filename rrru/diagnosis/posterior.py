@@ -7,7 +7,8 @@ from typing import Self
 
 import numpy as np
 
-from rrru.diagnosis.aliases import BoolArray, CauseSet, FloatArray
+from rrru.arrays import BoolArray, FloatArray
+from rrru.diagnosis.aliases import CauseSet
 from rrru.diagnosis.discrepancy_basis import UNKNOWN
 from rrru.diagnosis.evidence import ModelEvidence
 from rrru.diagnosis.evidence_kernels import log_sum_exp

@@ -12,11 +12,12 @@ from typing import Self
 import numpy as np
 import pandas as pd
 
+from rrru.arrays import BoolArray, FloatArray, IntArray
 from rrru.cache import last_cached_of
 from rrru.campaign import measurements as rows
 from rrru.campaign.driven_path import follows_path, passes_points, stops
 from rrru.campaign.noise import reading_series
-from rrru.diagnosis.aliases import BoolArray, EffectKey, FloatArray, IntArray
+from rrru.diagnosis.aliases import EffectKey
 from rrru.diagnosis.approach_direction import estimate_approach, has_direction
 from rrru.diagnosis.discrepancy_basis import Library, Unknown
 from rrru.diagnosis.evidence import ModelEvidence

@@ -16,7 +16,7 @@ import pandas as pd
 from scipy.linalg import solve_triangular
 from scipy.spatial.distance import cdist
 
-from rrru.diagnosis.aliases import BoolArray, FloatArray, IntArray
+from rrru.arrays import BoolArray, FloatArray, IntArray
 from rrru.diagnosis.heldout import within
 from rrru.diagnosis.inference import InferenceResult
 from rrru.diagnosis.options import OPTIONS

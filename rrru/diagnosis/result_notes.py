@@ -6,9 +6,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from rrru.arrays import FloatArray
 from rrru.campaign.ingest.zero_offsets import LARGE
 from rrru.campaign.noise import repeat_noise
-from rrru.diagnosis.aliases import FloatArray
 from rrru.diagnosis.inference import InferenceResult
 from rrru.diagnosis.make_problem import UNLOADED
 from rrru.diagnosis.options import OPTIONS

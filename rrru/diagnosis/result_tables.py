@@ -7,8 +7,9 @@ import numpy as np
 import pandas as pd
 from scipy.special import stdtrit
 
+from rrru.arrays import BoolArray, FloatArray
 from rrru.campaign import measurements as rows
-from rrru.diagnosis.aliases import BoolArray, FloatArray, ObjectArray, Row
+from rrru.diagnosis.aliases import ObjectArray, Row
 from rrru.diagnosis.detectability import detectability
 from rrru.diagnosis.discrepancy_basis import Library
 from rrru.diagnosis.inference import InferenceResult

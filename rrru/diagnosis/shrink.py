@@ -7,7 +7,8 @@ from typing import Self
 import numpy as np
 import pandas as pd
 
-from rrru.diagnosis.aliases import BoolArray, FloatArray, IntArray, Row
+from rrru.arrays import BoolArray, FloatArray, IntArray
+from rrru.diagnosis.aliases import Row
 from rrru.diagnosis.heldout import resampled_rows
 from rrru.diagnosis.inference import InferenceResult
 from rrru.diagnosis.options import OPTIONS

@@ -6,7 +6,8 @@ from typing import Self
 
 import numpy as np
 
-from rrru.diagnosis.aliases import BoolArray, EffectKey, FloatArray, WeightStep
+from rrru.arrays import BoolArray, FloatArray
+from rrru.diagnosis.aliases import EffectKey, WeightStep
 from rrru.diagnosis.discrepancy_basis import Library
 from rrru.diagnosis.payload_nuisance import WEIGHT
 from rrru.effects.protocol import Contribution, Motion, is_compliant, lacks_values

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rrru.diagnosis.aliases import FloatArray
+from rrru.arrays import FloatArray
 from rrru.diagnosis.discrepancy_basis import Library, TestedEffect
 from rrru.diagnosis.state import LinearizedProblem
 from rrru.effects.protocol import Coordinates, Motion

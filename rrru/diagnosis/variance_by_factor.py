@@ -7,7 +7,8 @@ import pandas as pd
 from scipy.spatial import cKDTree
 from scipy.special import chdtri
 
-from rrru.diagnosis.aliases import FloatArray, IntArray, ObjectArray, Row
+from rrru.arrays import FloatArray, IntArray
+from rrru.diagnosis.aliases import ObjectArray, Row
 from rrru.diagnosis.heldout import resampled_rows
 from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.problem import DiagnosisProblem

@@ -10,8 +10,8 @@ from typing import TypeAlias
 
 import numpy as np
 
+from rrru.arrays import FloatArray, IntArray
 from rrru.campaign.noise import along_runs
-from rrru.diagnosis.aliases import FloatArray, IntArray
 from rrru.diagnosis.discrepancy_basis import Library
 from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.payload_nuisance import WEIGHT

@@ -23,8 +23,8 @@ the backlash of its nut in mm (paper B, section 3.1).
 
 import numpy as np
 
+from rrru.arrays import FloatArray
 from rrru.effects.protocol import PATH, Contribution, Effect, Motion, drive_parameters, of_drives, plain_coordinates
-from rrru.kinematics.arrays import FloatArray
 from rrru.kinematics.robot import Robot
 from rrru.kinematics.typed_numba import njit
 from rrru.parameters import ParameterSet

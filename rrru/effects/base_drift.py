@@ -16,8 +16,8 @@ hundredths of a millimetre and microradians in an hour.
 
 import numpy as np
 
+from rrru.arrays import FloatArray
 from rrru.effects.protocol import Contribution, Effect, Motion, plain_coordinates
-from rrru.kinematics.arrays import FloatArray
 from rrru.kinematics.legs import WORLD
 from rrru.kinematics.robot import Robot
 from rrru.parameters import Parameter, ParameterSet

@@ -22,8 +22,8 @@ assumed: a base drilled to 0.5 mm on a radius of 400 mm, that is about 1e-3 rad.
 
 import numpy as np
 
+from rrru.arrays import FloatArray
 from rrru.effects.protocol import Contribution, Effect, Motion, leg_parameters, plain_coordinates
-from rrru.kinematics.arrays import FloatArray
 from rrru.kinematics.robot import Robot
 from rrru.parameters import ParameterSet
 

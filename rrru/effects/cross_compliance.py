@@ -30,8 +30,8 @@ from itertools import combinations
 
 import numpy as np
 
+from rrru.arrays import FloatArray
 from rrru.effects.protocol import Contribution, Effect, Motion, plain_coordinates
-from rrru.kinematics.arrays import FloatArray
 from rrru.kinematics.legs import Drive
 from rrru.kinematics.robot import Robot
 from rrru.parameters import Parameter, ParameterSet

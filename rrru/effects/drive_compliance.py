@@ -34,9 +34,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from rrru.arrays import FloatArray
 from rrru.effects.link_weights import LinkWeights, link_weights
 from rrru.effects.protocol import Contribution, Effect, Motion, drive_parameters, of_drives, plain_coordinates
-from rrru.kinematics.arrays import FloatArray
 from rrru.kinematics.robot import Robot
 from rrru.parameters import Parameter, ParameterSet
 

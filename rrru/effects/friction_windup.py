@@ -29,8 +29,8 @@ assumed: as large as the backlash of a worn drive, over some degrees or millimet
 
 import numpy as np
 
+from rrru.arrays import FloatArray
 from rrru.effects.protocol import PATH, Contribution, Effect, Motion, drive_parameters, of_drives, plain_coordinates
-from rrru.kinematics.arrays import FloatArray
 from rrru.kinematics.robot import Robot
 from rrru.kinematics.typed_numba import njit
 from rrru.parameters import Parameter, ParameterSet

@@ -7,8 +7,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from rrru.arrays import FloatArray, IntArray
 from rrru.effects.protocol import Contribution, Coordinates, Effect, Motion, leg_parameters
-from rrru.kinematics.arrays import FloatArray, IntArray
 from rrru.kinematics.robot import Robot
 from rrru.parameters import Parameter, ParameterSet
 

@@ -16,8 +16,8 @@ Fundamentals of Manipulator Calibration, 1991). Typical sizes assumed: 0.1 mm an
 
 import numpy as np
 
+from rrru.arrays import FloatArray
 from rrru.effects.protocol import Contribution, Effect, Motion, plain_coordinates
-from rrru.kinematics.arrays import FloatArray
 from rrru.kinematics.legs import Joint
 from rrru.kinematics.robot import Robot
 from rrru.parameters import Parameter, ParameterSet

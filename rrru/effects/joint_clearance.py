@@ -23,9 +23,9 @@ Paper A, section 3.3, names it as the cause of the error after calibration; its 
 
 import numpy as np
 
+from rrru.arrays import FloatArray
 from rrru.effects.link_flexure import HELD, held_shares, member_force
 from rrru.effects.protocol import Contribution, Effect, Motion, leg_parameters, plain_coordinates
-from rrru.kinematics.arrays import FloatArray
 from rrru.kinematics.robot import Robot
 from rrru.parameters import Parameter, ParameterSet
 

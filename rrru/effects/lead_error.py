@@ -17,9 +17,9 @@ Source: ISO 230-2, mean bidirectional positional deviation; ISO 3408-3, travel d
 
 import numpy as np
 
+from rrru.arrays import FloatArray
 from rrru.effects.harmonic import drives_of
 from rrru.effects.protocol import Contribution, Effect, Motion, leg_parameters, plain_coordinates
-from rrru.kinematics.arrays import FloatArray
 from rrru.kinematics.robot import Robot
 from rrru.parameters import ParameterSet
 

@@ -20,8 +20,8 @@ Source: paper A, section 2.2 (the 14 errors); the bounds are those of its calibr
 workshop holds on welded or clamped links of this length, ISO 2768-1 class m (+-0.8 mm from 400 to 1000 mm).
 """
 
+from rrru.arrays import FloatArray
 from rrru.effects.protocol import Contribution, Effect, Motion, leg_parameters, plain_coordinates
-from rrru.kinematics.arrays import FloatArray
 from rrru.kinematics.robot import Robot
 from rrru.parameters import ParameterSet
 

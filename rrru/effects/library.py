@@ -15,9 +15,9 @@ from typing import Any
 
 import numpy as np
 
+from rrru.arrays import FloatArray
 from rrru.effects.protocol import ActiveEffect, Contribution, Coordinates, Effect, Motion, plain_coordinates
 from rrru.errors import ConfigError
-from rrru.kinematics.arrays import FloatArray
 from rrru.kinematics.robot import Robot
 from rrru.parameters import ParameterSet
 from rrru.plugins import load_object

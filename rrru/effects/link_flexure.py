@@ -34,8 +34,8 @@ identification using local models applied to industrial robots, Automatica 47, 2
 
 import numpy as np
 
+from rrru.arrays import FloatArray
 from rrru.effects.protocol import Contribution, Effect, Motion, leg_parameters, plain_coordinates
-from rrru.kinematics.arrays import FloatArray
 from rrru.kinematics.legs import unit_twist
 from rrru.kinematics.robot import Robot
 from rrru.parameters import Parameter, ParameterSet

@@ -15,9 +15,9 @@ Source: as `thermal_growth`; Mayr et al., Thermal issues in machine tools, CIRP 
 
 import numpy as np
 
+from rrru.arrays import FloatArray
 from rrru.effects.protocol import Contribution, Effect, Motion, plain_coordinates
 from rrru.effects.thermal_growth import SHAPES, TIME_CONSTANT, lengths, warmth
-from rrru.kinematics.arrays import FloatArray
 from rrru.kinematics.legs import Legs
 from rrru.kinematics.robot import Robot
 from rrru.parameters import Parameter, ParameterSet

@@ -22,8 +22,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import qr
 
+from rrru.arrays import FloatArray, IntArray
 from rrru.effects.protocol import Motion
-from rrru.kinematics.arrays import FloatArray, IntArray
 from rrru.kinematics.parameter_jacobian import TwistMap
 from rrru.kinematics.robot import Robot
 from rrru.parameters import Parameter

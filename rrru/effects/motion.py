@@ -5,8 +5,8 @@ from functools import partial
 
 import numpy as np
 
+from rrru.arrays import FloatArray, IntArray
 from rrru.effects.protocol import LOADS, Motion
-from rrru.kinematics.arrays import FloatArray, IntArray
 from rrru.kinematics.chain import Poses
 from rrru.kinematics.dynamics import Masses, drive_rates, load_slopes, loads
 from rrru.kinematics.parameter_jacobian import TwistMap

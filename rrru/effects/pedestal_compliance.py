@@ -20,8 +20,8 @@ the sizes are assumed.
 
 import numpy as np
 
+from rrru.arrays import FloatArray
 from rrru.effects.protocol import Contribution, Effect, Motion, plain_coordinates
-from rrru.kinematics.arrays import FloatArray
 from rrru.kinematics.dynamics import level_axes
 from rrru.kinematics.legs import WORLD
 from rrru.kinematics.robot import Robot

@@ -8,7 +8,7 @@ from typing import Any, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from rrru.kinematics.arrays import BoolArray, FloatArray, IntArray
+from rrru.arrays import BoolArray, FloatArray, IntArray
 from rrru.kinematics.dynamics import Loads
 from rrru.kinematics.legs import Drive
 from rrru.kinematics.robot import Robot

@@ -25,8 +25,8 @@ Modelling, Planning and Control, 2009, sections 4.2 and 8.3. Sizes assumed: 1 mr
 
 import numpy as np
 
+from rrru.arrays import FloatArray
 from rrru.effects.protocol import Contribution, Effect, Motion, leg_parameters, plain_coordinates
-from rrru.kinematics.arrays import FloatArray
 from rrru.kinematics.robot import Robot
 from rrru.parameters import Parameter, ParameterSet
 

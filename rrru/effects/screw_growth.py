@@ -19,9 +19,9 @@ and Mass Transfer, lumped capacitance method (ch. 5). Sizes: steel has 1.2e-5 pe
 
 import numpy as np
 
+from rrru.arrays import FloatArray
 from rrru.effects.protocol import Contribution, Effect, Motion, plain_coordinates
 from rrru.effects.thermal_growth import SHAPES, TIME_CONSTANT, warmth
-from rrru.kinematics.arrays import FloatArray
 from rrru.kinematics.robot import Robot
 from rrru.parameters import Parameter, ParameterSet
 

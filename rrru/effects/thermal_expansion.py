@@ -16,9 +16,9 @@ DeWitt, Fundamentals of Heat and Mass Transfer, table A.1.
 
 import numpy as np
 
+from rrru.arrays import FloatArray
 from rrru.effects.protocol import Contribution, Effect, Motion, plain_coordinates
 from rrru.effects.thermal_growth import lengths
-from rrru.kinematics.arrays import FloatArray
 from rrru.kinematics.robot import Robot
 from rrru.parameters import Parameter, ParameterSet
 

@@ -21,8 +21,8 @@ aluminium has 2.3e-5 per kelvin, so that 10 K make 2.3e-4; time constants from h
 
 import numpy as np
 
+from rrru.arrays import FloatArray
 from rrru.effects.protocol import Contribution, Effect, Motion, plain_coordinates
-from rrru.kinematics.arrays import FloatArray
 from rrru.kinematics.legs import Legs
 from rrru.kinematics.robot import Robot
 from rrru.parameters import Parameter, ParameterSet

@@ -16,8 +16,8 @@ Manipulator Calibration, 1991). Typical size assumed: 0.5 mm.
 
 import numpy as np
 
+from rrru.arrays import FloatArray
 from rrru.effects.protocol import Contribution, Effect, Motion, plain_coordinates
-from rrru.kinematics.arrays import FloatArray
 from rrru.kinematics.legs import TOOL
 from rrru.kinematics.robot import Robot
 from rrru.parameters import Parameter, ParameterSet

@@ -22,8 +22,8 @@ aluminium) make more, sizes assumed.
 
 import numpy as np
 
+from rrru.arrays import FloatArray
 from rrru.effects.protocol import Contribution, Effect, Motion, plain_coordinates
-from rrru.kinematics.arrays import FloatArray
 from rrru.kinematics.legs import WORLD
 from rrru.kinematics.robot import Robot
 from rrru.parameters import Parameter, ParameterSet

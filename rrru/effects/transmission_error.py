@@ -28,9 +28,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from rrru.arrays import FloatArray, IntArray
 from rrru.effects.harmonic import at_harmonic, drives_of, harmonic_coordinates, harmonic_parameters
 from rrru.effects.protocol import Contribution, Effect, EffectModel, Motion, Search
-from rrru.kinematics.arrays import FloatArray, IntArray
 from rrru.kinematics.robot import Robot
 from rrru.parameters import Parameter, ParameterSet
 

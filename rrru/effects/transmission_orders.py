@@ -18,9 +18,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from rrru.arrays import FloatArray
 from rrru.effects.harmonic import waves
 from rrru.effects.protocol import Contribution, Coordinates, Effect, Motion
-from rrru.kinematics.arrays import FloatArray
 from rrru.kinematics.robot import Robot
 from rrru.parameters import Parameter, ParameterSet
 

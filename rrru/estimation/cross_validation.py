@@ -9,11 +9,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from scipy.linalg import cho_solve, solve_triangular
 
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
+from rrru.arrays import FloatArray, IntArray
 
 # every combination of parameters keeps at least this share of its information when a fold is left out: with less the
 # fold is extrapolated, which does not test the model

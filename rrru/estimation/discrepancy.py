@@ -12,9 +12,8 @@ from itertools import product
 from typing import Self
 
 import numpy as np
-import numpy.typing as npt
 
-FloatArray = npt.NDArray[np.float64]
+from rrru.arrays import FloatArray
 
 # cosines of a function of the place, of so many half waves along an axis: shorter ones have next to no amplitude
 _COSINES, _HALF_WAVES = 40, 12

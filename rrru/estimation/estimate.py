@@ -7,15 +7,12 @@ from itertools import product
 from typing import Self
 
 import numpy as np
-import numpy.typing as npt
 from scipy.linalg import solve_triangular
 
+from rrru.arrays import BoolArray, FloatArray
 from rrru.estimation.intervals import QUANTILE_95, NormalMixture
 from rrru.estimation.parameters import Parameters
 from rrru.estimation.problem import Problem
-
-FloatArray = npt.NDArray[np.float64]
-BoolArray = npt.NDArray[np.bool_]
 
 # a flat prior counts as a prior this many times wider than the uncertainty that the parameter's column alone leaves
 _FLAT = 1e9

@@ -20,17 +20,15 @@ from itertools import product
 from typing import Protocol, runtime_checkable
 
 import numpy as np
-import numpy.typing as npt
 from scipy.linalg import solve_triangular
 from scipy.special import gammaln, log_ndtr, logsumexp
 from scipy.stats import multivariate_normal
 
+from rrru.arrays import FloatArray
 from rrru.errors import FitError
 from rrru.estimation.discrepancy import Discrepancy
 from rrru.estimation.estimate import Estimate, triangle_of, with_prior
 from rrru.estimation.problem import log_determinant
-
-FloatArray = npt.NDArray[np.float64]
 
 _LOG_2PI = float(np.log(2.0 * np.pi))
 # a parameter is not determined where a smaller share of its column is independent of the others

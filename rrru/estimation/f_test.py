@@ -26,13 +26,11 @@ from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
-import numpy.typing as npt
 from scipy import special, stats
 
+from rrru.arrays import FloatArray
 from rrru.estimation.estimate import Estimate
 from rrru.estimation.problem import Whiten, log_determinant
-
-FloatArray = npt.NDArray[np.float64]
 
 # a direction of the columns, in units of their lengths, of which a smaller share remains is absorbed by the parameters
 _RANK_TOLERANCE = 1e-6

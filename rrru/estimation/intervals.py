@@ -3,9 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-FloatArray = npt.NDArray[np.float64]
+from rrru.arrays import FloatArray
 
 # half width of a normal distribution's interval of 95 % over its standard deviation
 QUANTILE_95 = 1.959964

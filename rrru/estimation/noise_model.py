@@ -30,9 +30,8 @@ from scipy.linalg import qr, toeplitz
 from scipy.optimize import minimize_scalar
 from scipy.special import chdtr, expit, fdtrc
 
+from rrru.arrays import FloatArray
 from rrru.campaign.noise import along_runs
-
-FloatArray = npt.NDArray[np.float64]
 
 _CORRELATIONS = np.array([0.0, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9])
 _OFFSETS = np.array([0.0, 0.02, 0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2])

@@ -9,9 +9,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy.special import expit, logsumexp
 
+from rrru.arrays import FloatArray
 from rrru.parameters import ParameterSet
-
-FloatArray = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

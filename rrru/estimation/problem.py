@@ -5,12 +5,11 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-import numpy.typing as npt
 
+from rrru.arrays import FloatArray
 from rrru.errors import FitError
 from rrru.estimation.parameters import Parameters
 
-FloatArray = npt.NDArray[np.float64]
 Whiten = Callable[[FloatArray], FloatArray]
 
 

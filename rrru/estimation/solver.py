@@ -17,11 +17,10 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import solve_triangular
 
+from rrru.arrays import FloatArray
 from rrru.errors import FitError
 from rrru.estimation.estimate import Estimate, SearchEnd, triangle_of, with_prior
 from rrru.estimation.problem import Problem
-
-FloatArray = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,7 @@ import numpy.typing as npt
 import pandas as pd
 from scipy.spatial.transform import Rotation
 
+from rrru.arrays import FloatArray
 from rrru.campaign import measurements as rows
 from rrru.campaign.target_registration import TargetReadings, TargetRegistration, register_targets
 from rrru.errors import FitError
@@ -25,8 +26,6 @@ from rrru.estimation.solver import solve
 from rrru.kinematics.base_parameters import open_numbers
 from rrru.kinematics.legs import TOOL, WORLD
 from rrru.kinematics.readings import Readings, lacking, place_on_platform
-
-FloatArray = npt.NDArray[np.float64]
 
 # a median residual above this share of the robot's size is not due to errors of its geometry
 FAR_SHARE_OF_SIZE = 2e-3

@@ -10,7 +10,7 @@ from functools import cached_property
 
 import numpy as np
 
-from rrru.kinematics.arrays import BoolArray, FloatArray
+from rrru.arrays import BoolArray, FloatArray
 from rrru.kinematics.base_parameters import (
     Candidate,
     MeasurementConfig,

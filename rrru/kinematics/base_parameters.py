@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rrru.kinematics.arrays import BoolArray, FloatArray
+from rrru.arrays import BoolArray, FloatArray
 from rrru.kinematics.legs import TOOL, WORLD, Legs, Parts, unit_twist
 from rrru.parameters import Parameter, ParameterSet
 

@@ -10,8 +10,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
+from rrru.arrays import BoolArray, FloatArray, IntArray, Rows
 from rrru.kinematics import chain_kernel
-from rrru.kinematics.arrays import BoolArray, FloatArray, IntArray, Rows
 from rrru.kinematics.legs import Joint, Leg, Legs
 
 

@@ -5,7 +5,7 @@ Numba's cache does not see other files; so all functions that these call are her
 
 import numpy as np
 
-from rrru.kinematics.arrays import BoolArray, FloatArray, IntArray
+from rrru.arrays import BoolArray, FloatArray, IntArray
 from rrru.kinematics.typed_numba import njit
 
 Triple = FloatArray | tuple[float, float, float]

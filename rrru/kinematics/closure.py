@@ -16,9 +16,9 @@ from typing import Protocol
 
 import numpy as np
 
+from rrru.arrays import BoolArray, FloatArray
 from rrru.errors import ConfigError
 from rrru.kinematics import closure_kernel
-from rrru.kinematics.arrays import BoolArray, FloatArray
 from rrru.kinematics.chain import PoseGuess, Poses, Twists, Walk
 from rrru.kinematics.closure_kernel import ARM_MM, Tables
 from rrru.kinematics.legs import Leg, Legs

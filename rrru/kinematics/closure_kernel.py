@@ -11,7 +11,7 @@ mm, angles in rad; in screws and small twists lengths are counted in the arm.
 
 import numpy as np
 
-from rrru.kinematics.arrays import BoolArray, FloatArray, IntArray
+from rrru.arrays import BoolArray, FloatArray, IntArray
 from rrru.kinematics.typed_numba import njit
 
 TOLERANCE_MM, MOST_STEPS = 1e-10, 60

@@ -10,7 +10,7 @@ import numpy as np
 from numba import types
 from numba.extending import intrinsic
 
-from rrru.kinematics.arrays import FloatArray
+from rrru.arrays import FloatArray
 
 # a kernel writes the values (m,) of deviations (m, p); legs (3, k, 1 + p) and points (rows, n) are the robot's own
 SIGNATURE = types.void(types.float64[:, ::1], types.float64[:, :, ::1], types.float64[:, ::1], types.float64[::1])

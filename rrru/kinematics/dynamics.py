@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rrru.kinematics.arrays import FloatArray, IntArray
+from rrru.arrays import FloatArray, IntArray
 from rrru.kinematics.chain import EndEffectorPoses, Poses
 from rrru.kinematics.legs import Legs, cross
 from rrru.kinematics.parameter_jacobian import TwistMap

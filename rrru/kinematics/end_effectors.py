@@ -14,8 +14,8 @@ from itertools import cycle, islice
 
 import numpy as np
 
+from rrru.arrays import FloatArray, IntArray
 from rrru.errors import ConfigError
-from rrru.kinematics.arrays import FloatArray, IntArray
 from rrru.kinematics.chain import EndEffectorPoses, PoseGuess, Poses, Twists, Walk, walk
 from rrru.kinematics.general_robot import GeneralRobot
 from rrru.kinematics.legs import Drive, Joint, Leg, Legs, Parts

@@ -15,9 +15,9 @@ from typing import Self
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from rrru.arrays import BoolArray, FloatArray
 from rrru.errors import ConfigError
 from rrru.kinematics import base_parameters
-from rrru.kinematics.arrays import BoolArray, FloatArray
 from rrru.kinematics.base_parameters import (
     Candidate,
     MeasurementConfig,

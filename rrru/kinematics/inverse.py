@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from rrru.arrays import BoolArray, FloatArray
 from rrru.cache import last_cached
-from rrru.kinematics.arrays import BoolArray, FloatArray
 from rrru.kinematics.chain import PoseGuess, Twists, bar_pose, walk
 from rrru.kinematics.legs import Leg, Legs
 from rrru.kinematics.parameter_jacobian import TwistMap

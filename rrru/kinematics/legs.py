@@ -18,8 +18,8 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from rrru.arrays import FloatArray, IntArray
 from rrru.errors import ConfigError
-from rrru.kinematics.arrays import FloatArray, IntArray
 
 WORLD, TOOL = "world", "tool"
 X, Y, Z = np.eye(3)

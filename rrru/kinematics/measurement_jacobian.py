@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rrru.kinematics.arrays import FloatArray, IntArray
+from rrru.arrays import FloatArray, IntArray
 from rrru.kinematics.chain import Poses
 from rrru.kinematics.legs import TOOL, WORLD
 from rrru.kinematics.parameter_jacobian import TwistMap

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rrru.kinematics.arrays import FloatArray
+from rrru.arrays import FloatArray
 from rrru.kinematics.chain import PoseGuess, Twists, walks
 from rrru.kinematics.closure_kernel import ARM_MM
 from rrru.kinematics.legs import Legs

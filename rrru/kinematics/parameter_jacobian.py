@@ -16,8 +16,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
+from rrru.arrays import BoolArray, FloatArray, IntArray
 from rrru.kinematics import chain_kernel
-from rrru.kinematics.arrays import BoolArray, FloatArray, IntArray
 from rrru.kinematics.chain import Poses, Twists, Walk, active_sites, walks
 from rrru.kinematics.closure import ForwardModel
 from rrru.kinematics.legs import TOOL, WORLD, Leg, cross

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rrru.kinematics.arrays import FloatArray
+from rrru.arrays import FloatArray
 from rrru.kinematics.chain import Poses, Twists, Walk, value_of, walks
 from rrru.kinematics.legs import Leg, Legs, cross, turn_about
 

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
-from rrru.kinematics.arrays import BoolArray, FloatArray, IntArray, Rows
+from rrru.arrays import BoolArray, FloatArray, IntArray, Rows
 from rrru.kinematics.chain import Poses
 from rrru.kinematics.legs import TOOL, WORLD, Legs
 

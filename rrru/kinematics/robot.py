@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 import numpy.typing as npt
 
+from rrru.arrays import BoolArray, FloatArray
 from rrru.errors import UnreachableError
-from rrru.kinematics.arrays import BoolArray, FloatArray
 from rrru.kinematics.base_parameters import Candidate, MeasurementConfig
 from rrru.kinematics.chain import PoseGuess, Poses
 from rrru.kinematics.closure import Closure, ForwardModel

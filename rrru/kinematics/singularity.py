@@ -10,7 +10,7 @@ from typing import Protocol
 
 import numpy as np
 
-from rrru.kinematics.arrays import FloatArray
+from rrru.arrays import FloatArray
 from rrru.kinematics.parameter_jacobian import singular_values
 
 

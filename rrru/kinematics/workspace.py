@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rrru.kinematics.arrays import BoolArray, FloatArray
+from rrru.arrays import BoolArray, FloatArray
 
 if TYPE_CHECKING:
     from rrru.kinematics.robot import Robot

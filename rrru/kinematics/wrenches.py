@@ -9,7 +9,7 @@ from collections.abc import Sequence, Set
 
 import numpy as np
 
-from rrru.kinematics.arrays import FloatArray
+from rrru.arrays import FloatArray
 from rrru.kinematics.chain import Twists, Walk, walk
 from rrru.kinematics.closure_kernel import ARM_MM
 from rrru.kinematics.legs import Joint, Legs, cross

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from rrru.arrays import FloatArray
 from rrru.errors import ConfigError
-from rrru.kinematics.arrays import FloatArray
 from rrru.kinematics.general_robot import GeneralRobot
 from rrru.kinematics.legs import Joint, Leg, Legs, X, Y, Z
 from rrru.robots.hexapod import bar_parts, driven_bars

@@ -24,8 +24,8 @@ from typing import ClassVar
 
 import numpy as np
 
+from rrru.arrays import FloatArray
 from rrru.errors import ConfigError
-from rrru.kinematics.arrays import FloatArray
 from rrru.kinematics.chain import Poses
 from rrru.kinematics.dynamics import Masses, arm_load
 from rrru.kinematics.legs import Joint, Leg, Legs, Parts, X, Y, Z, turn_about

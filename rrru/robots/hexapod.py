@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from rrru.arrays import FloatArray
 from rrru.errors import ConfigError
-from rrru.kinematics.arrays import FloatArray
 from rrru.kinematics.general_robot import GeneralRobot
 from rrru.kinematics.legs import Bar, Drive, Joint, Leg, Legs, Parts, unit_twist
 

@@ -7,8 +7,8 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
+from rrru.arrays import FloatArray
 from rrru.errors import ConfigError
-from rrru.kinematics.arrays import FloatArray
 from rrru.robots.ptt3 import Ptt3
 
 # ASSUME firmware states only the difference of the radii; this platform radius acts on its tilt only

@@ -17,7 +17,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from rrru.kinematics.arrays import FloatArray
+from rrru.arrays import FloatArray
 from rrru.kinematics.chain import Poses
 from rrru.kinematics.compiled import CompiledObjective
 from rrru.kinematics.dynamics import Masses, arm_load

@@ -8,7 +8,7 @@ from functools import cache
 
 import numpy as np
 
-from rrru.kinematics.arrays import FloatArray
+from rrru.arrays import FloatArray
 from rrru.kinematics.compiled import Kernel, fma
 from rrru.kinematics.typed_numba import njit
 from rrru.robots.three_legs import ThreeLegs

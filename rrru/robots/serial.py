@@ -16,8 +16,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
+from rrru.arrays import FloatArray
 from rrru.errors import ConfigError
-from rrru.kinematics.arrays import FloatArray
 from rrru.kinematics.general_robot import GeneralRobot
 from rrru.kinematics.inverse import end_of
 from rrru.kinematics.legs import TOOL, WORLD, Drive, Joint, Leg, Legs, Parts, X, Z, turn_about, unit_twist

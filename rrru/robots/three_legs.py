@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 import numpy.typing as npt
 
+from rrru.arrays import FloatArray
 from rrru.errors import ConfigError
 from rrru.kinematics import singularity, workspace
-from rrru.kinematics.arrays import FloatArray
 from rrru.kinematics.legs import Drive, unit_twist
 from rrru.kinematics.robot import Robot
 from rrru.parameters import LEGS, Parameter, ParameterSet

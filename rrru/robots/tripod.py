@@ -16,8 +16,8 @@ from typing import ClassVar
 
 import numpy as np
 
+from rrru.arrays import FloatArray
 from rrru.kinematics import singularity
-from rrru.kinematics.arrays import FloatArray
 from rrru.kinematics.legs import Bar, Joint, Leg, X, Y, cross
 from rrru.robots.rrru3_kernels import tripod_mean_distance
 from rrru.robots.three_legs import ThreeLegs, of_three_legs, points

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 from cv2.typing import MatLike
 
-from rrru.kinematics.arrays import FloatArray
+from rrru.arrays import FloatArray
 
 # ASSUME the paper does not show its grey values: dark dots on a bright plate, which is larger than the dots' field
 _PLATE, _DOT = 215.0, 40.0

@@ -6,11 +6,11 @@ from collections.abc import Callable
 import numpy as np
 import pandas as pd
 
+from rrru.arrays import BoolArray, FloatArray
 from rrru.campaign.measurements import turn_columns, vector_columns
 from rrru.campaign.plan import Plan
 from rrru.effects.motion import Course, make_motion
 from rrru.effects.protocol import Motion
-from rrru.kinematics.arrays import BoolArray, FloatArray
 from rrru.kinematics.chain import Poses
 from rrru.kinematics.dynamics import Masses
 from rrru.kinematics.robot import Robot

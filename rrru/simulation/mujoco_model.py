@@ -14,8 +14,8 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
+from rrru.arrays import FloatArray
 from rrru.errors import ConfigError
-from rrru.kinematics.arrays import FloatArray
 
 MM = 1000.0
 STEP_S = 2e-4

@@ -9,10 +9,10 @@ import numpy as np
 import pandas as pd
 from scipy.spatial.transform import Rotation
 
+from rrru.arrays import FloatArray
 from rrru.campaign.plan import Plan
 from rrru.effects.protocol import Motion
 from rrru.errors import ConfigError
-from rrru.kinematics.arrays import FloatArray
 from rrru.kinematics.chain import Poses
 from rrru.kinematics.dynamics import Masses
 from rrru.kinematics.robot import Robot

@@ -13,9 +13,9 @@ import numpy as np
 from scipy.interpolate import Akima1DInterpolator, CubicHermiteSpline
 from scipy.spatial.transform import Rotation
 
+from rrru.arrays import FloatArray
 from rrru.effects.protocol import Motion
 from rrru.errors import SimulationError, UnreachableError
-from rrru.kinematics.arrays import FloatArray
 from rrru.simulation.mujoco_model import MM, PAYLOAD, STEP_S, Edit
 
 # a recorded point's loops are open by less, and its platform is slower, angles counted at an arm of half a metre: a

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
+from rrru.arrays import FloatArray, IntArray
 from rrru.effects.motion import Course, make_motion
 from rrru.effects.protocol import together
 from rrru.errors import UnreachableError
-from rrru.kinematics.arrays import FloatArray, IntArray
 from rrru.simulation.virtual_robot import VirtualRobot
 
 PASSES = ("forward_1", "reverse", "forward_2")

@@ -8,8 +8,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
+from rrru.arrays import FloatArray, IntArray
 from rrru.campaign import measurements as rows
-from rrru.kinematics.arrays import FloatArray, IntArray
 from rrru.kinematics.chain import Poses
 from rrru.kinematics.legs import TOOL
 from rrru.kinematics.readings import orientation, turned_by

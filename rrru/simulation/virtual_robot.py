@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
+from rrru.arrays import FloatArray
 from rrru.campaign.plan import Plan
 from rrru.effects.library import active_effects
 from rrru.effects.motion import make_motion, standing
 from rrru.effects.protocol import ActiveEffect, Motion, bears_load, together
 from rrru.errors import ConfigError
-from rrru.kinematics.arrays import FloatArray
 from rrru.kinematics.chain import Poses
 from rrru.kinematics.dynamics import Masses
 from rrru.kinematics.robot import Robot

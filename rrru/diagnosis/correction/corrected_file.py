@@ -13,8 +13,8 @@ from typing import Any, cast
 import numpy as np
 import pandas as pd
 
+from rrru.arrays import FloatArray
 from rrru.campaign import measurements as rows
-from rrru.diagnosis.aliases import FloatArray
 from rrru.diagnosis.calibrate import calibrate
 from rrru.diagnosis.inference import InferenceResult, with_effects
 from rrru.diagnosis.model_fit import fit_model

@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from rrru.arrays import FloatArray
 from rrru.campaign import measurements as rows
 from rrru.campaign.stated_motion import rests
-from rrru.diagnosis.aliases import FloatArray
 from rrru.diagnosis.correction.corrected_file import Corrected, corrected
 from rrru.diagnosis.correction.drive_table import at_end, at_rest, corrected_drives, effect_twists
 from rrru.diagnosis.diagnose import Diagnosis

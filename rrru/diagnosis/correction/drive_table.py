@@ -9,8 +9,8 @@ import pandas as pd
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
+from rrru.arrays import FloatArray, IntArray
 from rrru.campaign import measurements as rows
-from rrru.diagnosis.aliases import FloatArray, IntArray
 from rrru.diagnosis.inference import InferenceResult
 from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.problem import DiagnosisProblem

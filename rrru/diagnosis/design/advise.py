@@ -15,8 +15,9 @@ from itertools import product
 import numpy as np
 import pandas as pd
 
+from rrru.arrays import FloatArray
 from rrru.campaign import measurements as rows
-from rrru.diagnosis.aliases import FloatArray, Row
+from rrru.diagnosis.aliases import Row
 from rrru.diagnosis.design import poses
 from rrru.diagnosis.design.expected_information import Contest, contests_of, greedy, realized, worth
 from rrru.diagnosis.design.run_limits import RunLimits, StatedLimits, run_limits

@@ -16,7 +16,7 @@ from typing import Self
 import numpy as np
 import pandas as pd
 
-from rrru.diagnosis.aliases import FloatArray
+from rrru.arrays import FloatArray
 from rrru.diagnosis.hypothesis import Answer
 from rrru.diagnosis.inference import InferenceResult
 from rrru.diagnosis.options import OPTIONS

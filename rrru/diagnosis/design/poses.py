@@ -13,9 +13,9 @@ import numpy as np
 import numpy.typing as npt
 import pandas as pd
 
+from rrru.arrays import BoolArray, FloatArray
 from rrru.campaign import measurements as rows
 from rrru.campaign.speed_profile import Trapezoid
-from rrru.diagnosis.aliases import BoolArray, FloatArray
 from rrru.diagnosis.options import OPTIONS
 from rrru.kinematics.inverse import inverse_kinematics
 from rrru.kinematics.robot import Robot

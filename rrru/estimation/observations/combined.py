@@ -6,12 +6,10 @@ from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
-import numpy.typing as npt
 
+from rrru.arrays import FloatArray
 from rrru.errors import FitError
 from rrru.estimation.problem import Observations
-
-FloatArray = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

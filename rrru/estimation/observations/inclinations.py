@@ -14,9 +14,9 @@ from functools import cached_property
 from typing import ClassVar, cast
 
 import numpy as np
-import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
+from rrru.arrays import FloatArray
 from rrru.cache import last_cached
 from rrru.errors import FitError
 from rrru.estimation.parameters import Block
@@ -25,8 +25,6 @@ from rrru.kinematics.legs import WORLD
 from rrru.kinematics.measurement_jacobian import ReadingMap
 from rrru.kinematics.readings import Readings, orientation
 from rrru.kinematics.robot import Robot
-
-FloatArray = npt.NDArray[np.float64]
 
 _X, _Y, _Z = np.eye(3)
 # a sensor whose axis is so near to gravity's plane has no roll

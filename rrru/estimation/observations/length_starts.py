@@ -10,10 +10,8 @@ five anchors in one plane do not determine this map, since it is confounded with
 from collections.abc import Iterator
 
 import numpy as np
-import numpy.typing as npt
 
-FloatArray = npt.NDArray[np.float64]
-BoolArray = npt.NDArray[np.bool_]
+from rrru.arrays import BoolArray, FloatArray
 
 # a length may miss up to this share of the longest, and a row may be a bad one: several of each are tried
 _MISSING_SHARES = (0.0, 0.02, -0.02, 0.05, -0.05, 0.1, -0.1, 0.2)

@@ -20,14 +20,12 @@ from typing import ClassVar
 import numpy as np
 import numpy.typing as npt
 
+from rrru.arrays import BoolArray, FloatArray
 from rrru.cache import last_cached
 from rrru.errors import FitError
 from rrru.estimation.observations.multilateration import MIN_DISTANCE_MM, Multilateration, row_loss
 from rrru.estimation.parameters import Parameters
 from rrru.estimation.problem import Problem
-
-FloatArray = npt.NDArray[np.float64]
-BoolArray = npt.NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)

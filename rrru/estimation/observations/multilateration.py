@@ -10,8 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-FloatArray = npt.NDArray[np.float64]
-BoolArray = npt.NDArray[np.bool_]
+from rrru.arrays import BoolArray, FloatArray
 
 # a place at an anchor has no direction from it: the distance in mm that it is held off
 MIN_DISTANCE_MM = 1e-9

@@ -8,13 +8,11 @@ from functools import cached_property
 from typing import ClassVar, Self
 
 import numpy as np
-import numpy.typing as npt
 
+from rrru.arrays import FloatArray
 from rrru.cache import last_cached
 from rrru.errors import FitError
 from rrru.kinematics.robot import Robot
-
-FloatArray = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -12,15 +12,13 @@ from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
-import numpy.typing as npt
 
+from rrru.arrays import FloatArray
 from rrru.cache import last_cached
 from rrru.errors import FitError
 from rrru.kinematics.chain import Poses
 from rrru.kinematics.readings import Readings, lacking
 from rrru.kinematics.robot import Robot
-
-FloatArray = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -5,8 +5,8 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
+from rrru.arrays import FloatArray
 from rrru.campaign import measurements as rows
 from rrru.campaign.target_registration import PLACE_SD_MM
 from rrru.diagnosis.problem import DiagnosisProblem
@@ -23,8 +23,6 @@ from rrru.kinematics.legs import WORLD
 from rrru.kinematics.readings import Readings
 from rrru.kinematics.robot import Robot
 from rrru.parameters import Parameter, ParameterSet
-
-FloatArray = npt.NDArray[np.float64]
 
 FRAMES = "frames"
 # prior s.d.: an instrument is within ten metres of the robot
