@@ -13,7 +13,7 @@ from rrru.formats.chains import Chains, Cut, with_bars
 from rrru.formats.couplings import Follows, coupling
 from rrru.formats.joint_graph import Move, undone
 from rrru.formats.mjcf_reader import Assembly
-from rrru.kinematics.chain import Poses, Twists, bar_pose, walk
+from rrru.kinematics.chain import PoseGuess, Twists, bar_pose, walk
 from rrru.kinematics.closure import Closure
 from rrru.kinematics.closure_kernel import ARM_MM
 from rrru.kinematics.legs import Legs
@@ -84,8 +84,7 @@ def structure_of(
 
 def _closed(assembly: Assembly, legs: Legs, up: tuple[float, float, float]) -> Legs:
     """Legs whose home pose closes all loops next to the file's; raises ConfigError where it cannot."""
-    # a start has neither residual nor closed
-    start = Poses(legs.home_mm[None], legs.home_turn[None], legs.home_passive[None], None, None)  # type: ignore[arg-type]
+    start = PoseGuess(legs.home_mm[None], legs.home_turn[None], legs.home_passive[None])
     gaps = _gaps(legs, start)
     if gaps.max() > _OPEN_MM:
         joints = ", ".join(assembly.names_along(assembly.paths[gaps.argmax()]))
@@ -108,7 +107,7 @@ def _closed(assembly: Assembly, legs: Legs, up: tuple[float, float, float]) -> L
     return replace(legs, legs=chains, home_mm=poses.position_mm[0], home_turn=poses.turn[0])
 
 
-def _gaps(legs: Legs, poses: Poses) -> np.ndarray:
+def _gaps(legs: Legs, poses: PoseGuess) -> np.ndarray:
     """Closure error (legs,) in mm of every leg at one pose with drives at home, angles counted in the arm."""
     result, actuators, twists = [], legs.home_drives[None], Twists(legs)
     for leg in legs.legs:

@@ -300,6 +300,12 @@ def unit_twist(component: int, factor: float = 1.0) -> FloatArray:
     return result
 
 
+def rigid_motions(place_mm: FloatArray) -> FloatArray:
+    """Displacements (n, 3, 6) of places (n, 3) of a body by its small motions: shifts, then turns about the origin."""
+    turned = np.cross(np.eye(3)[None], place_mm[:, None]).transpose(0, 2, 1)
+    return np.concatenate([np.broadcast_to(np.eye(3), turned.shape), turned], axis=2)
+
+
 def cross(first: FloatArray, second: FloatArray) -> FloatArray:
     """Cross products (.., 3) of vectors (.., 3): `np.cross` takes longer to look at them than to multiply."""
     result = np.empty(np.broadcast_shapes(np.shape(first), np.shape(second)))

@@ -21,6 +21,7 @@ from rrru.campaign.driven_path import follows_path
 from rrru.campaign.ingest.checks import path_length
 from rrru.campaign.measurements import command, measured, series
 from rrru.campaign.outliers import MAX_ROBUST_SDS, MEDIAN_OF_LENGTH, robust_sd, unless_many
+from rrru.kinematics.legs import rigid_motions
 
 # Most consecutive bad points that are looked for; the running median's window must hold more good points than bad.
 _LONGEST = 3
@@ -148,9 +149,7 @@ def like_geometry(
     fitted = known & ~marked
     if 3 * fitted.sum() < jacobian.shape[2] + _RIGID + _LEAST_SPARE:
         return np.zeros(len(marked), dtype=bool)
-    arm = command_mm - command_mm[fitted].mean(axis=0)
-    turns = np.cross(np.eye(3)[:, None], arm[None]).transpose(1, 2, 0)
-    columns = np.concatenate([jacobian, np.tile(np.eye(3), (len(arm), 1, 1)), turns], axis=2)
+    columns = np.concatenate([jacobian, rigid_motions(command_mm - command_mm[fitted].mean(axis=0))], axis=2)
     # columns in different units; those of parameters without influence stay zero
     size = np.linalg.norm(columns[fitted], axis=(0, 1))
     columns = columns / np.where(size > 0.0, size, 1.0)

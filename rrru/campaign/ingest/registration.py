@@ -7,6 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rrru.errors import FitError
+from rrru.kinematics.legs import rigid_motions
 
 # ASSUME points closer to one line than this share of their spread along it leave the turn about that line open to the
 # robot's own errors.
@@ -86,8 +87,7 @@ def _covariance(placed: np.ndarray, off: np.ndarray, rotation: np.ndarray, trans
     from scipy.spatial.transform import Rotation
 
     spare = 3 * len(placed) - 6
-    crossed = np.cross(np.eye(3)[None], placed[:, None]).transpose(0, 2, 1)
-    columns = np.concatenate([np.broadcast_to(np.eye(3), crossed.shape), crossed], axis=2).reshape(-1, 6)
+    columns = rigid_motions(placed).reshape(-1, 6)
     variance = (off**2).sum() / spare if spare else np.nan
     # of (s, w) to the translation t + s + w x t and the rotation vector of exp(w) R, by central differences
     step, slope = 1e-6, np.eye(6)

@@ -20,6 +20,7 @@ from scipy.spatial.transform import Rotation
 from rrru.arrays import FloatArray
 from rrru.cache import last_cached
 from rrru.errors import FitError
+from rrru.kinematics.legs import rigid_motions
 from rrru.kinematics.robot import Robot
 
 
@@ -112,9 +113,8 @@ class Shape(_Places):
     @cached_property
     def _fixed_frame(self) -> FloatArray:
         """Orthonormal rows (3n - 6, 3n): small motions of the frame about the measured places do not reach them."""
-        turned = np.cross(np.eye(3)[None], (self.measured_mm - self.measured_mm.mean(axis=0))[:, None])
-        motions = np.concatenate([np.tile(np.eye(3), (len(self), 1, 1)), turned], axis=1)
-        return np.asarray(linalg.null_space(motions.transpose(1, 0, 2).reshape(6, -1)).T)
+        motions = rigid_motions(self.measured_mm - self.measured_mm.mean(axis=0))
+        return np.asarray(linalg.null_space(motions.reshape(-1, 6).T).T)
 
     @last_cached
     def _aligned(self, values: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:

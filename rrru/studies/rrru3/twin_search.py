@@ -20,6 +20,7 @@ from rrru.effects.protocol import Motion, together
 from rrru.errors import ConfigError, FitError, UnreachableError
 from rrru.kinematics import singularity
 from rrru.kinematics.dynamics import PER_NEWTON, carried_kg, gravity
+from rrru.kinematics.legs import rigid_motions
 from rrru.robots.rrru3 import Rrru3
 from rrru.simulation.driven import non_repeatability
 from rrru.simulation.virtual_robot import VirtualRobot
@@ -201,10 +202,7 @@ def _spiked(motion, trajectory, twin):
 
 def _rigid_part(target, errors):
     """The part of errors (d, n, 3) at targets (n, 3) that a registration removes: shift and small turn, (d, n, 3)."""
-    arm = target - target.mean(axis=0)
-    turns = np.cross(np.eye(3)[:, None], arm[None]).transpose(1, 2, 0)
-    basis = np.concatenate([np.tile(np.eye(3), (len(target), 1, 1)), turns], axis=2).reshape(-1, 6)
-    basis = np.linalg.qr(basis).Q
+    basis = np.linalg.qr(rigid_motions(target - target.mean(axis=0)).reshape(-1, 6)).Q
     return (errors.reshape(len(errors), -1) @ basis @ basis.T).reshape(errors.shape)
 
 
