@@ -17,6 +17,7 @@ from rrru.diagnosis.posterior import Posterior
 from rrru.diagnosis.problem import GEOMETRY, DiagnosisProblem
 from rrru.effects.protocol import is_compliance
 from rrru.estimation.estimate import Estimate
+from rrru.estimation.intervals import QUANTILE_95
 from rrru.kinematics.legs import WORLD
 from rrru.kinematics.robot import Robot
 
@@ -83,11 +84,12 @@ def _confounded_with(robot: Robot, zero: str, least: float) -> str:
 
 def payload_notes(inference: InferenceResult) -> Iterator[str]:
     """Sentences on significant errors of payload and tilt that the readings determine, and on those at a bound."""
-    for name, unit, value, _ in _nuisance_at_bound(inference):
+    for name, unit, value, interval in _nuisance_at_bound(inference):
         what = "mass at the platform" if unit == "kg" else f"tilt of the base about {name[-1]}"
+        stated, check = ("masses", "the stated masses and payloads") if unit == "kg" else ("level base", "its level")
         yield (
-            f"the fitted error of the {what} is at its bound, {value:.3g} {unit}: stated loads and deflections "
-            "contradict each other, and sizes of compliances are not reliable; check the stated masses and payloads"
+            f"the fitted error of the {what} is at its bound, {_sized(value, interval, unit)}: the stated {stated} "
+            f"cannot explain the deflections, and sizes of compliances may be biased; check {check}"
         )
     for name, unit, value, interval, determined in _significant_nuisance(inference):
         if determined:
@@ -114,13 +116,19 @@ def mass_notes(problem: DiagnosisProblem) -> Iterator[str]:
         yield MASSES_UNKNOWN
 
 
-def _nuisance_at_bound(inference: InferenceResult) -> list[tuple[str, str, float, float]]:
-    """Errors of payload and tilt that end at a bound, each (name, unit, value, standard error)."""
+def _nuisance_at_bound(inference: InferenceResult) -> Iterator[tuple[str, str, float, FloatArray]]:
+    """Name, unit, value and 95 % interval of each significant error of payload and tilt that ends at a bound.
+
+    There the interval is one-sided, and its width over the normal quantile stands in for the standard error.
+    """
     estimate, weight = inference.fit.estimate, inference.fit.weight
     if not weight or inference.problem.massless:
-        return []
-    held = estimate.at_bound[estimate.parameters.places[WEIGHT]]
-    return [one for one, bound in zip(weight, held, strict=True) if bound]
+        return
+    block = estimate.parameters.places[WEIGHT]
+    held, intervals = estimate.at_bound[block], estimate.intervals[block]
+    for (name, unit, value, _), bound, interval in zip(weight, held, intervals, strict=True):
+        if bound and abs(value) > OPTIONS.min_nuisance_z * np.ptp(interval) / QUANTILE_95:
+            yield name, unit, value, interval
 
 
 def _significant_nuisance(inference: InferenceResult) -> Iterator[tuple[str, str, float, FloatArray, bool]]:
