@@ -5,6 +5,7 @@ omitted-variable bias of a calibration without an effect of how the campaign was
 from collections.abc import Iterator
 
 import numpy as np
+from scipy.special import chdtri
 
 from rrru.arrays import FloatArray
 from rrru.campaign.ingest.zero_offsets import LARGE
@@ -26,8 +27,12 @@ MASSES_UNKNOWN = (
     "no masses of the links are stated: without them payloads alone tell the size of a compliance, and the weight of "
     "the links may appear as another effect, state them in the robot's file (`inertial`, or `mass_kg` of a row of `dh`)"
 )
-# said where a part of the gap looks like random error and no pose was measured under the same conditions again
+# said where a part of the gap looks like random error, by what poses say that were measured under the same conditions
+# again: there are none; there are too few; they agree
 REPEATABILITY_UNKNOWN = "repeatability is unknown: no pose was measured twice"
+REPEATABILITY_UNSURE = "repeatability is unknown: too few poses were measured twice"
+ROBOT_REPEATS = "poses that were measured again agree better than the noise that was found"
+_SCATTERS = "the robot does not repeat, or the instrument is worse"
 
 
 def zero_notes(estimate: Estimate, robot: Robot) -> Iterator[str]:
@@ -151,9 +156,19 @@ def _significant_nuisance(inference: InferenceResult) -> Iterator[tuple[str, str
             yield name, unit, value, interval, determined
 
 
-def measured_again(problem: DiagnosisProblem) -> bool:
-    """Whether poses of a problem were measured more than once under the same conditions."""
-    return bool(repeat_noise(problem.measurements[problem.used])[1] > 0)
+def repeatability(problem: DiagnosisProblem, stated_mm: float) -> str:
+    """What poses that were measured again say of a noise found that is larger than the stated one (mm per axis).
+
+    REPEATABILITY_UNKNOWN, REPEATABILITY_UNSURE or ROBOT_REPEATS, empty where they scatter by more than the stated
+    noise. Limits are those of the 95 % interval of their standard deviation, from the chi-square distribution.
+    """
+    repeated, freedom = repeat_noise(problem.measurements[problem.used])
+    if not freedom:
+        return REPEATABILITY_UNKNOWN
+    least, most = (repeated * np.sqrt(freedom / chdtri(freedom, tail)) for tail in (0.025, 0.975))
+    if most < problem.noise_mm:
+        return ROBOT_REPEATS
+    return "" if least > stated_mm else REPEATABILITY_UNSURE
 
 
 def noise_notes(problem: DiagnosisProblem, stated_mm: float | None, contradicted: float) -> Iterator[str]:
@@ -164,11 +179,17 @@ def noise_notes(problem: DiagnosisProblem, stated_mm: float | None, contradicted
         return
     found = f"noise stated {stated_mm:.3g} mm per axis, found {problem.noise_mm:.3g}"
     if problem.noise_mm > contradicted * stated_mm:
-        if measured_again(problem):
-            yield f"{found}: the robot does not repeat, or the instrument is worse"
+        known, missing = repeatability(problem, stated_mm), "the robot has errors that are not in the model"
+        if known == ROBOT_REPEATS:
+            yield f"{found}: {missing}"
         else:
-            yield f"{found}: the instrument is worse, or the robot has errors that are not in the model"
-            yield REPEATABILITY_UNKNOWN
+            yield f"{found}: {f'the instrument is worse, or {missing}' if known else _SCATTERS}"
+        if known:
+            yield known
+    elif problem.noise is not None and (problem.noise.axis_mm > contradicted * stated_mm).any():
+        # one axis alone may have a part of the gap
+        if known := repeatability(problem, stated_mm):
+            yield known
     elif problem.noise_mm < stated_mm / contradicted:
         yield f"{found}: the instrument is better"
 

@@ -12,7 +12,12 @@ import pandas as pd
 from rrru.diagnosis.aliases import Facts
 from rrru.diagnosis.design.run_limits import NO_PAYLOAD, WITHIN_LIMITS
 from rrru.diagnosis.options import OPTIONS
-from rrru.diagnosis.result_notes import MASSES_UNKNOWN, REPEATABILITY_UNKNOWN
+from rrru.diagnosis.result_notes import (
+    MASSES_UNKNOWN,
+    REPEATABILITY_UNKNOWN,
+    REPEATABILITY_UNSURE,
+    ROBOT_REPEATS,
+)
 from rrru.diagnosis.verdict import NOT_TESTED, POSSIBLE
 from rrru.effects.causes import cause_texts
 from rrru.effects.protocol import is_per_load
@@ -41,7 +46,14 @@ _READABLE |= {"mm/N": ("µm/N", 1e3), "1/K": ("µm/(m K)", 1e6), "mm/s": ("µm/s
 _LIMITED = (NO_PAYLOAD, WITHIN_LIMITS)
 _UNSURE = "No cause is probable enough to be named; the most probable answer follows."
 _NO_SIZE = "Its size is not determined, because no masses of the links are stated."
-_RANDOM = "random error above the stated noise. Repeatability is unknown: no pose was measured twice."
+# what looks like random error above the stated noise, by the note on repeated poses; else it does not repeat
+_ABOVE_NOISE = "is random error above the stated noise. Repeatability is unknown:"
+_RANDOM = {
+    REPEATABILITY_UNKNOWN: f"{_ABOVE_NOISE} no pose was measured twice.",
+    REPEATABILITY_UNSURE: f"{_ABOVE_NOISE} too few poses were measured twice.",
+    ROBOT_REPEATS: "looks like random error. Poses that were measured again agree better: the model lacks an error.",
+}
+_DOES_NOT_REPEAT = "does not repeat from pass to pass: no model can correct it."
 
 
 def answer(
@@ -190,8 +202,10 @@ def _effect(
     cause = tables["gap_attribute"].set_index("effect").loc[name]
     legs = cause["legs"] if isinstance(cause["legs"], str) else ""
     numbers = tables["gap_parameters"].query("effect == @name").to_dict("records")
-    places = tables["gap_drive_functions"].query("effect == @name and worst")
     leg = (int(legs),) if legs.isdigit() else ()
+    places = tables["gap_drive_functions"].query("effect == @name and worst")
+    # of an effect of one leg its largest error is that of its drive
+    places = places[places["drive"].isin(leg or places["drive"])]
     return {
         "name": name,
         **vars(cause_texts(name, drives, leg)),
@@ -415,17 +429,13 @@ def _scatter(facts: Facts) -> list[str]:
     share = sum(part["share"] for part in parts)
     if share < OPTIONS.min_mentioned_share:
         return []
-    unknown = REPEATABILITY_UNKNOWN in facts["notes"]
+    how = next((text for note, text in _RANDOM.items() if note in facts["notes"]), _DOES_NOT_REPEAT)
     if not _shares_are_determined(facts):
-        if unknown:
-            return [f"Some of it is {_RANDOM}"]
-        return ["Some of it does not repeat from pass to pass: no model can correct it."]
+        return [f"Some of it {how}"]
     # the interval of a sum is not known
     acting = [part for part in parts if part["share"]]
     size = _initial(share_with_interval(acting[0])) if len(acting) == 1 else percent(share)
-    if unknown:
-        return [f"{size} is {_RANDOM}"]
-    return [f"{size} does not repeat from pass to pass: no model can correct it."]
+    return [f"{size} {how}"]
 
 
 def _scatter_parts(facts: Facts, least: float = 0.0) -> list[Facts]:

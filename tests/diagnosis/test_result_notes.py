@@ -14,7 +14,15 @@ from rrru.diagnosis.calibrate import calibrate
 from rrru.diagnosis.diagnose import MeasuredRobot, with_wide_bounds
 from rrru.diagnosis.make_problem import make_diagnosis_problem
 from rrru.diagnosis.model_fit import fit_model
-from rrru.diagnosis.result_notes import noise_notes, payload_notes, undetermined_payload_notes, zero_notes
+from rrru.diagnosis.result_notes import (
+    REPEATABILITY_UNKNOWN,
+    REPEATABILITY_UNSURE,
+    ROBOT_REPEATS,
+    noise_notes,
+    payload_notes,
+    undetermined_payload_notes,
+    zero_notes,
+)
 from rrru.diagnosis.terms import EffectTerm
 from rrru.errors import ConfigError
 from rrru.kinematics.dynamics import Masses
@@ -156,6 +164,38 @@ def test_with_one_load_a_mass_and_a_compliance_are_confounded():
     weight, notes, (note,) = _weighed((campaigns.FORWARD, campaigns.REVERSE), 0.5 * _PLATFORM_KG)
     assert weight[0][2] > 3.0 * weight[0][3]
     assert not notes and note.endswith("are not separately identifiable from these readings: measure with two loads")
+
+
+def _stops_again(again, sd_mm, found_mm):
+    """A problem of 60 stops of which some were measured again, with a noise of the readings and one that was found."""
+    rng = np.random.default_rng(again)
+    place = np.concatenate([grid := rng.uniform(-300.0, 300.0, (60, 3)), grid[:again]])
+    columns = rows.vector_columns("command", place)
+    columns |= rows.vector_columns("measured", place + sd_mm * rng.standard_normal(place.shape))
+    frame = pd.DataFrame({"run": 1, "trajectory": "stops", "point": np.arange(1, len(place) + 1), **columns})
+    frame = frame.assign(status="ok", speed_mm_s=np.nan, payload_kg=np.nan, time_s=np.nan)
+    return SimpleNamespace(measurements=frame, used=np.ones(len(place), dtype=bool), noise_mm=found_mm, noise=None)
+
+
+@pytest.mark.parametrize(
+    ("again", "sd_mm", "said", "why"),
+    [
+        (10, 0.03, ROBOT_REPEATS, "the robot has errors that are not in the model"),
+        (10, 0.09, "", "the robot does not repeat, or the instrument is worse"),
+        (1, 0.06, REPEATABILITY_UNSURE, "the instrument is worse, or the robot has errors that are not in the model"),
+        (0, 0.03, REPEATABILITY_UNKNOWN, "the instrument is worse, or the robot has errors that are not in the model"),
+    ],
+)
+def test_what_does_not_repeat_is_said_by_what_poses_say_that_were_measured_again(again, sd_mm, said, why):
+    """A fixed error of an encoder looks like random error of 0.09 mm; its repeats agree within the stated 0.03."""
+    first, *more = noise_notes(_stops_again(again, sd_mm, 0.09), 0.03, 1.3)
+    assert first == f"noise stated 0.03 mm per axis, found 0.09: {why}" and more == ([said] if said else [])
+    # a single axis above the limit
+    one = _stops_again(again, sd_mm, 0.035)
+    one.noise = SimpleNamespace(axis_mm=np.array([0.02, 0.03, 0.05]))
+    # next to a found noise of 0.035 mm ten repeats are too few
+    expected = REPEATABILITY_UNSURE if said == ROBOT_REPEATS else said
+    assert [*noise_notes(one, 0.03, 1.3)] == ([expected] if expected else [])
 
 
 def test_a_stated_noise_of_zero_is_no_noise_and_noted():

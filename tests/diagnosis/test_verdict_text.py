@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rrru.diagnosis import verdict_text
-from rrru.diagnosis.result_notes import REPEATABILITY_UNKNOWN
+from rrru.diagnosis.result_notes import REPEATABILITY_UNKNOWN, REPEATABILITY_UNSURE, ROBOT_REPEATS
 from rrru.effects.causes import cause_texts
 from rrru.report.cards import card
 from rrru.robots.catalogue import make_mechanism
@@ -44,7 +44,7 @@ def answered(budget=None, runs=(), drives=_LEGS, places=(), follows=(), causes=N
             columns=("effect", *verdict_text._NUMBER),
         ),
         "gap_next_runs": pd.DataFrame(list(runs), columns=verdict_text._RUN),
-        "gap_drive_functions": pd.DataFrame(list(places), columns=("effect", "worst", *verdict_text._WORST)),
+        "gap_drive_functions": pd.DataFrame(list(places), columns=("effect", "drive", "worst", *verdict_text._WORST)),
         "gap_remainder": pd.DataFrame(list(follows), columns=verdict_text._FOLLOWS),
         "gap_left_out": pd.DataFrame({"reason": ["outlier in the file"], "points": [2]}),
     }
@@ -203,6 +203,15 @@ def test_without_a_pose_measured_twice_repeatability_is_unknown():
         "10 % (95 %: 8 % to 13 %) is random error above the stated noise. "
         "Repeatability is unknown: no pose was measured twice." in said
     )
+    for note, words in (
+        (REPEATABILITY_UNSURE, "is random error above the stated noise. Repeatability is unknown: too few poses were "),
+        (
+            ROBOT_REPEATS,
+            "looks like random error. Poses that were measured again agree better: the model lacks ",
+        ),
+    ):
+        said = " ".join(answered(notes=note)["sentences"])
+        assert f"10 % (95 %: 8 % to 13 %) {words}" in said and "does not repeat" not in said
 
 
 @pytest.mark.parametrize(("factor", "gap", "why"), [(12.0, 0.02, "small"), (1.0, 0.0, "small"), (12.0, 0.2, "alike")])
@@ -273,15 +282,20 @@ def test_every_cause_says_what_to_inspect_and_what_to_do_by_the_kind_of_the_driv
 
 def test_where_a_drive_error_is_largest_is_said_with_its_interval():
     places = [
-        ("backlash", True, "axis1", "rad", 0.5, 2e-4, 1e-4, 3e-4),
-        ("backlash", True, "axis2", "rad", np.radians(-37.0), -5e-4, -5.5e-4, -4.5e-4),
-        ("backlash", False, "axis2", "rad", 0.1, 9e-4, 8e-4, 1e-3),
+        ("backlash", 1, True, "axis1", "rad", 0.5, 2e-4, 1e-4, 3e-4),
+        ("backlash", 2, True, "axis2", "rad", np.radians(-37.0), -5e-4, -5.5e-4, -4.5e-4),
+        ("backlash", 2, False, "axis2", "rad", 0.1, 9e-4, 8e-4, 1e-3),
     ]
     facts_of = answered(places=places)
     said = " ".join(facts_of["sentences"])
     text = "largest for axis2 at -37.0 degrees: -0.000500 rad (95 %: -0.000550 to -0.000450) off its mean over "
     assert text in said
     jsonschema.validate(json.loads(json.dumps(facts_of)), SCHEMA)
+    # link flexure acts in leg 2; of the other legs nothing is said
+    of_leg = answered(
+        places=[("link_flexure", k, True, f"leg {k}", "rad", 0.5, k * 1e-4, 0.0, 1e-3) for k in (1, 2, 3)]
+    )
+    assert "largest for leg 2 at 28.6 degrees" in " ".join(of_leg["sentences"])
 
 
 def test_what_the_unexplained_follows_is_said_where_one_variable_predicts_most_of_it():

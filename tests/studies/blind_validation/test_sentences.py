@@ -119,7 +119,9 @@ _CASES = [
         ({"lacking": "1", "used": "126"}, {}, _FACTS),
     ),
     ("the noise is larger", ({}, _UNKNOWN, _OUTSIDE), ({}, {}, _FACTS)),
+    ("it looks random and repeats", ({}, _UNKNOWN, _OUTSIDE), ({}, {}, _FACTS)),
     ("repeatability is unknown", ({}, {"again": False}, _FACTS), ({}, {}, _FACTS)),
+    ("repeatability is unsure", ({}, {}, _FACTS), ({}, {"again": False}, _FACTS)),
     ("an effect needs what is not there", ({"needs": "drive_rate"}, {}, _FACTS), ({"needs": "time_s"}, {}, _FACTS)),
     (
         "an effect needs different values",
@@ -241,7 +243,7 @@ _NEVER = {
     *(f"interval of a share: {kind}" for kind in ("covariance", "sampling", "calibration")),
 }
 # kinds that are true, or false, of every robot that is drawn
-_ALWAYS = {"no commanded positions": True} | dict.fromkeys(
+_ALWAYS = {"no commanded positions": True, "the robot repeats": True} | dict.fromkeys(
     [
         *(
             "no cause is named",

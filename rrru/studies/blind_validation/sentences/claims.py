@@ -59,6 +59,7 @@ _SENTENCES = {
     rf"answer(?:, alone or with further causes)?: {_P}\.",
     "it does not repeat": rf"(?:{_SHARE}|An undetermined share|Some of it) does not repeat from pass to pass.*",
     "it is random error": rf"(?:{_SHARE}|An undetermined share|Some of it) is random error above the stated noise.*",
+    "it looks random and repeats": rf"(?:{_SHARE}|An undetermined share|Some of it) looks like random error\..*",
     "what is left with it": rf"With (?:it|them) in the simulator the residual error at left-out points is {_X} mm; "
     rf"the noise is {_Y} mm\.",
     "these data cannot rule out": r"(?:These data cannot rule out|Parts of the unexplained share could be): "
@@ -86,10 +87,12 @@ _NOTES = {
     "points used": r"(?P<used>\d+) of (?P<rows>\d+) points used(?:, .*)?",
     "few readings": r"few readings: (?P<numbers>\d+) numbers for (?P<parameters>\d+) parameters .*",
     "fitted without some points": r"(?P<names>[\w, ]+) fitted without (?P<lacking>\d+) of (?P<used>\d+) points, .*",
-    "the noise is larger": rf"noise stated {_X} mm per axis, found {_Y}: the (?:robot does not|instrument is worse).*",
+    "the noise is larger": rf"noise stated {_X} mm per axis, found {_Y}: the (?:robot|instrument is worse).*",
     "the noise is smaller": rf"noise stated {_X} mm per axis, found {_Y}: the instrument is better",
     "a noise of zero was stated": rf"noise_mm is 0, which no instrument reaches: the noise is estimated, {_X} mm .*",
     "repeatability is unknown": r"repeatability is unknown: no pose was measured twice",
+    "repeatability is unsure": r"repeatability is unknown: too few poses were measured twice",
+    "the robot repeats": r"poses that were measured again agree better than the noise that was found",
     "masses are unknown": r"no masses of the links are stated: .*",
     "an effect needs what is not there": r"(?P<name>\w+) not tested: needs (?P<needs>[\w, ]+), which the columns .*",
     "an effect needs different values": r"(?P<name>\w+) not tested: needs (?P<needs>[\w, ]+) of more than one value",

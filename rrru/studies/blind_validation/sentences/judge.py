@@ -382,7 +382,9 @@ _JUDGES = {
     "fitted without some points": lambda stated, t, _: int(stated["lacking"]) < int(stated["used"]) <= t.rows,
     # only errors outside every model, as those of MuJoCo's servos, make it look larger
     "the noise is larger": lambda _, t, __: t.outside or t.still_mm > _OWN * t.noise_rms_mm,
+    "it looks random and repeats": lambda _, t, __: t.outside or t.still_mm > _OWN * t.noise_rms_mm,
     "repeatability is unknown": lambda _, t, __: not t.again,
+    "repeatability is unsure": lambda _, t, __: t.again,
     "an effect needs what is not there": _needs,
     "an effect needs different values": _needs_different,
     "an effect is a calibration's number": lambda stated, t, _: stated["name"] not in t.effects,
@@ -423,7 +425,7 @@ _JUDGES = {
     "detectable_mm": _detectable,
 }
 # what is true, or false, of every file here: readings are sound, and robots are upright and carry the stated mass
-_OF_EVERY_FILE = {"no commanded positions": True} | dict.fromkeys(
+_OF_EVERY_FILE = {"no commanded positions": True, "the robot repeats": True} | dict.fromkeys(
     (
         "no cause is named",
         "what to check",
