@@ -207,7 +207,7 @@ def test_without_a_pose_measured_twice_repeatability_is_unknown():
         (REPEATABILITY_UNSURE, "is random error above the stated noise. Repeatability is unknown: too few poses were "),
         (
             ROBOT_REPEATS,
-            "looks like random error. Poses that were measured again agree better: the model lacks ",
+            "looks like random error. Poses that were measured again agree better: it is an error that the model lacks",
         ),
     ):
         said = " ".join(answered(notes=note)["sentences"])
