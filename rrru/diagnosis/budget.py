@@ -66,7 +66,7 @@ def _drawn(
     share of the noise that the calibration absorbs.
     """
     problem, evidence, posterior = inference.problem, inference.evidence, inference.posterior
-    linear = evidence.linear
+    linear, lacks_fit = evidence.linear, inference.lacks_fit
     left = _LeftByCalibration(linear.base, problem.on_robot)
     data, count = left.residual(linear.data.reshape(-1, 1)), int(problem.on_robot.sum())
     weights = posterior.weights.ravel()
@@ -84,10 +84,10 @@ def _drawn(
         for pair in products:
             if set(pair) <= set(parts):
                 products[pair][some] = 2.0 * (parts[pair[0]] * parts[pair[1]]).sum(axis=0) / count
-        if posterior.unexplained[row, level] and _UNEXPLAINED not in parts:
+        if posterior.unexplained[row, level] and (lacks_fit or _UNEXPLAINED not in parts):
             beyond = data - sum(parts.values(), np.zeros((len(data), counts[number])))
             spare = 3.0 * problem.noise_mm**2 * (1.0 - left.taken)
-            squares[_UNEXPLAINED][some] = np.maximum((beyond**2).sum(axis=0) / count - spare, 0.0)
+            squares[_UNEXPLAINED][some] += np.maximum((beyond**2).sum(axis=0) / count - spare, 0.0)
     return squares, products, left.taken
 
 

@@ -247,6 +247,8 @@ def _decide(
     ruled_out: set[str] = set()
     small: frozenset[str] = frozenset()
     while True:
+        if inference.lacks_fit:
+            inference = inference.with_posterior(inference.posterior.all_unexplained())
         verdict = decide(inference.posterior, inference.problem.effects, small)
         fitted = with_effects(inference, verdict.effects)
         least = OPTIONS.max_heldout_loss_nats if verdict.unexplained else -OPTIONS.max_heldout_loss_nats

@@ -32,6 +32,8 @@ from rrru.estimation.noise_model import MIN_FREE_NUMBERS, alike, fit_noise, high
 
 # what the configuration says of the noise
 KNOWN, STATED, UNKNOWN_NOISE = "known", "stated", "unknown"
+# source of a noise that poses say that were measured again
+REPEATS = "repeats"
 
 
 @dataclass(frozen=True)
@@ -64,6 +66,22 @@ class InferenceResult:
     def held_out(self) -> HeldOut:
         """Predictions of left-out points."""
         return HeldOut(self.problem, self.evidence)
+
+    @property
+    def lacks_fit(self) -> bool:
+        """Whether stops in no order leave clearly more than the noise of repeated poses, whatever is fitted.
+
+        No function of the discrepancy follows an error that differs from stop to stop, so that the evidence of none is
+        larger than that of the calibration alone (lack of fit against pure error: Draper and Smith, Applied regression
+        analysis, 1998).
+        """
+        problem = self.problem
+        if self.noise_from != REPEATS or problem.along_paths:
+            return False
+        residual = problem.residual(self.state)
+        freedom = max(residual.size - len(self.fit.estimate.parameters), 1)
+        left_mm = float(np.sqrt((residual**2).sum() / freedom))
+        return left_mm > OPTIONS.min_left_per_repeats * problem.noise_mm
 
     def with_posterior(self, posterior: Posterior) -> "InferenceResult":
         """The inference with another posterior and its best hypothesis; the fit stays."""
@@ -120,7 +138,7 @@ def with_noise(
     model = replace(model, alike=alike(data, columns, problem.stop[complete], problem.kind[complete]))
     repeated = noise.quieter_repeats(problem.measurements[problem.used], model.mean_mm, model.correlation)
     if repeated is not None:
-        return problem.under(model.of_size(repeated)), "repeats"
+        return problem.under(model.of_size(repeated)), REPEATS
     return problem.under(model), "fitted"
 
 

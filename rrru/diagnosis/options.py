@@ -144,6 +144,9 @@ class DiagnosisOptions:
     # a best answer that leaves so many times the noise is not of the robot that was measured: an arm without an effect
     # for its worst cause leaves ten or twenty times, exchanged drives or a wrong tool thousands of times; assumed
     max_left_per_noise: float = 100.0
+    # residuals of stops in no order that are so many times the noise of repeated poses have a part that is unexplained
+    # and larger than that noise: the root of two
+    min_left_per_repeats: float = 1.414
     # a verdict of this probability needs no further run; one of less has rivals even where none is named; assumed
     min_sure_probability: float = 0.9
 

@@ -1,7 +1,7 @@
 """Posterior probabilities of effects, of sets of them, and of a discrepancy, from the evidence of hypotheses."""
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Self
 
@@ -104,6 +104,10 @@ class Posterior:
         keep = ~self._holding(effect)
         remaining = tuple(h for h, keeps in zip(self.hypotheses, keep, strict=True) if keeps)
         return Posterior(remaining, self.log_weights[keep], self.unexplained[keep], self.apart, self.expanded)
+
+    def all_unexplained(self) -> "Posterior":
+        """The posterior with something unexplained in every hypothesis."""
+        return replace(self, unexplained=np.ones_like(self.unexplained))
 
     @property
     def height(self) -> float:

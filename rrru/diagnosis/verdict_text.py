@@ -51,7 +51,8 @@ _ABOVE_NOISE = "is random error above the stated noise. Repeatability is unknown
 _RANDOM = {
     REPEATABILITY_UNKNOWN: f"{_ABOVE_NOISE} no pose was measured twice.",
     REPEATABILITY_UNSURE: f"{_ABOVE_NOISE} too few poses were measured twice.",
-    ROBOT_REPEATS: "looks like random error. Poses that were measured again agree better: it is an error that the model lacks.",
+    ROBOT_REPEATS: "looks like random error. Poses that were measured again agree better: it is an error that the "
+    "model lacks.",
 }
 _DOES_NOT_REPEAT = "does not repeat from pass to pass, in the robot or in the instrument: no model can correct it."
 

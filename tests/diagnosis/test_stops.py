@@ -7,8 +7,10 @@ import pytest
 from rrru.campaign import measurements as rows
 from rrru.campaign.outliers import isolated
 from rrru.diagnosis.calibrate import calibrate
+from rrru.diagnosis.diagnose import MeasuredRobot, diagnose
 from rrru.diagnosis.heldout import HeldOut
 from rrru.diagnosis.make_problem import make_diagnosis_problem
+from rrru.diagnosis.settings import GapSettings
 from rrru.effects.library import find
 from rrru.estimation.noise_model import NoiseModel, alike
 from rrru.kinematics.dynamics import Masses
@@ -191,3 +193,25 @@ def test_between_stops_in_no_order_slides_come_from_the_stop_before():
     for number, part in enumerate(gantry.GANTRY.parts.drives):
         change = made[1:, sites[part.site]] @ part.twist
         np.testing.assert_allclose(change, -0.5 * width * np.sign(np.diff(drive[:, number])), atol=1e-12)
+
+
+@pytest.mark.parametrize("wrong_mm", [0.0, 2.0])
+def test_a_wrong_place_of_a_target_is_unexplained_where_repeats_tell_the_noise(wrong_mm):
+    """Its error turns with the platform, and no function follows it from stop to stop: it was called no error."""
+    table = _campaign(0.0)
+    again = table[table.index < 45].assign(point=lambda frame: frame["point"] + 3 * _STOPS)
+    generator = np.random.default_rng(7)
+    noise = 0.02 * np.sqrt(2.0) * generator.standard_normal((len(again), 3))
+    again = again.assign(**rows.vector_columns("measured", rows.measured(again) + noise))
+    table = pd.concat([table, again], ignore_index=True)
+    table.loc[table["target"] == "b", "target_x_mm"] += wrong_mm
+    robot = MeasuredRobot(arms.reading(table), arms.MASSES, 0.03)
+    found = diagnose(table, robot, GapSettings(("backlash", "encoder_eccentricity")))
+    verdict, shrink = found.verdict, found.tables["gap_shrink"].query("kind == 'held_out' and trajectory == '*'")
+    # a gap and the noise make the held-out error
+    parts = np.hypot(shrink["gap_rms_mm"], shrink["noise_rms_mm"])
+    np.testing.assert_allclose(parts, shrink["rms_mm"], rtol=0.2)
+    assert verdict["effects"] == ("unexplained" if wrong_mm else "none")
+    if wrong_mm:
+        unexplained = found.tables["gap_budget"].set_index("part").loc["unexplained"]
+        assert unexplained["share"] > 0.9 and unexplained["probability"] == pytest.approx(1.0)
