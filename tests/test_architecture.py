@@ -11,6 +11,7 @@ from tests.places import ROOT
 _ROOT = ROOT
 _FLOORS = {
     "__version__": 0,
+    "arrays": 1,
     "errors": 1,
     "seeds": 1,
     "cache": 1,
