@@ -363,6 +363,7 @@ def load_robot(
     home: Mapping[str, float] | None = None,
     platform: str | None = None,
     tool_mm: Sequence[float] | None = None,
+    up: Sequence[float] | None = None,
     limits: Mapping[str, float] | None = None,
 ) -> RobotModel:
     """A robot from a URDF or MJCF file, from one of the package's names, or from an entry of a configuration.
@@ -372,7 +373,8 @@ def load_robot(
     example with rows of a DH table. name: by default the file's. tip, base: links of a URDF; tips: links of several
     end effectors by name, carries: names of the targets on each; home: joint values of a pose that is not singular, rad
     or mm; platform: the MJCF's body that carries the measured point; tool_mm: the measured point in the last frame;
-    limits: of further runs, `payload_kg`, `speed_mm_s`, `minutes`.
+    up (3,): direction against gravity in the base's frame, by default z, or as an MJCF states it; limits: of further
+    runs, `payload_kg`, `speed_mm_s`, `minutes`.
 
     Raises ConfigError for a file that cannot be read, an unknown name, or a wrong value.
 
@@ -383,7 +385,7 @@ def load_robot(
     ('q1_rad', 'q2_rad')
     """
     stated: dict[str, Any] = {"tip": tip, "base": base, "tips": tips, "carries": carries, "home": home}
-    stated |= {"platform": platform, "tool_mm": tool_mm, "limits": limits}
+    stated |= {"platform": platform, "tool_mm": tool_mm, "up": up, "limits": limits}
     given = {key: _plain(value) for key, value in stated.items() if value is not None}
     name, entry = _entry(source, name)
     entry = merged(entry, given)

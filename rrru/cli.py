@@ -141,6 +141,7 @@ def _of_robot(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--base", help="URDF: fixed link")
     parser.add_argument("--platform", help="MJCF: body that carries the measured point")
     parser.add_argument("--tool", type=_place, metavar="X,Y,Z", help="measured point in the last frame, mm")
+    parser.add_argument("--up", type=_place, metavar="X,Y,Z", help="direction against gravity in the base's frame")
 
 
 def _config(parser: argparse.ArgumentParser) -> None:
@@ -180,7 +181,7 @@ def _with_robot(options: argparse.Namespace, config: dict[str, Any]) -> tuple[di
     if options.robot is None or options.robot in config["robots"]:
         return config, options.robot
     of_file = {key: getattr(options, key) for key in _OF_ROBOT}
-    robot = api.load_robot(options.robot, tool_mm=options.tool, **of_file)
+    robot = api.load_robot(options.robot, tool_mm=options.tool, up=options.up, **of_file)
     return merged(config, {"robots": {robot.name: robot.entry}}), robot.name
 
 

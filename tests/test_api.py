@@ -203,6 +203,8 @@ def test_a_table_of_dh_rows_is_the_arm_that_its_formula_says():
         (ROOT / "config.yaml", {"name": "nobody"}, "robots has no 'nobody'"),
         (ARM, {"tip": "elbow_link_of_nobody"}, "elbow_link_of_nobody"),
         ({"dh": [{"a_cm": 3.0}]}, {}, "a_cm"),
+        (ARM, {"up": [0.0, 0.0, 0.0]}, "up is 0, 0, 0; allowed: a direction"),
+        (ARM, {"up": [0.0, 1.0]}, "up: "),
         ("rrru3", {"limits": {"payload": 3.0}}, "did you mean payload_kg for payload"),
     ],
 )

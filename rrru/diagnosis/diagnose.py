@@ -34,6 +34,7 @@ from rrru.diagnosis.result_notes import (
     bias_notes,
     fit_notes,
     mass_notes,
+    mounting_notes,
     noise_notes,
     payload_notes,
     posterior_notes,
@@ -179,6 +180,7 @@ def _notes(inference: InferenceResult, stated_mm: float | None, excluded: pd.Dat
         yield f"{', '.join(sorted(acting))} fitted without {where_not}"
     yield from noise_notes(problem, stated_mm, CONTRADICTED)
     yield from mass_notes(problem)
+    yield from mounting_notes(inference)
     for effect, note in problem.untestable.items():
         yield f"{effect} not tested: {note}"
 

@@ -27,6 +27,10 @@ MASSES_UNKNOWN = (
     "no masses of the links are stated: without them payloads alone tell the size of a compliance, and the weight of "
     "the links may appear as another effect, state them in the robot's file (`inertial`, or `mass_kg` of a row of `dh`)"
 )
+# said where an effect depends on loads of a robot whose file does not say how it is mounted
+MOUNTING_ASSUMED = (
+    "gravity is assumed along -z of the robot's base: state `up` of the robot if it is mounted on a wall or a ceiling"
+)
 # said where a part of the gap looks like random error, by what poses say that were measured under the same conditions
 # again: there are none; there are too few; they agree
 REPEATABILITY_UNKNOWN = "repeatability is unknown: no pose was measured twice"
@@ -119,6 +123,15 @@ def mass_notes(problem: DiagnosisProblem) -> Iterator[str]:
     untested = {name for name, why in problem.untestable.items() if why == UNLOADED}
     if problem.massless and (untested or any(is_compliance(effect) for effect in problem.effects.values())):
         yield MASSES_UNKNOWN
+
+
+def mounting_notes(inference: InferenceResult) -> Iterator[str]:
+    """The sentence that the direction of gravity is assumed, where a named effect depends on it."""
+    effects = inference.problem.effects
+    if not inference.problem.mechanism.up_stated and any(
+        is_compliance(effects[name]) for name, _ in inference.state.effects if name in effects
+    ):
+        yield MOUNTING_ASSUMED
 
 
 def _nuisance_at_bound(inference: InferenceResult) -> Iterator[tuple[str, str, float, FloatArray]]:

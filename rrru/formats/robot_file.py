@@ -67,7 +67,7 @@ def from_urdf(
         arms = {arm: from_urdf(path, base, link, home, **options) for arm, link in tips.items()}
         robot: GeneralRobot = with_hands(arms, shared_joints(arms), carries)
         return robot
-    return _robot(*urdf_parts(file, base, tip, home), options)
+    return _robot(*urdf_parts(file, base, tip, home), {"up_stated": "up" in options} | options)
 
 
 def with_tip(section: dict[str, Any]) -> dict[str, Any]:

@@ -120,7 +120,8 @@ def _own(name: str) -> property:
 
 # tests/kinematics/test_readings.py goes over the attributes of all robots: one that is missing here is found there
 for _name in (
-    *("name", "parts", "angle_arm_mm", "up", "tool_mm", "orients", "workspace_lines", "seats", "point_masses"),
+    *("name", "parts", "angle_arm_mm", "up", "up_stated", "tool_mm", "orients", "workspace_lines", "seats"),
+    "point_masses",
     *("reach_mm", "size_mm", "farthest_mm", "freedoms", "strokes", "drive_range", "effort_limits", "velocity_limits"),
     *("TRACKED", "RICHEST", "SEARCHED", "in_range", "unreached", "guess", "passive_near", "gauge"),
     *("confounded_outside", "own_load", "own_member_forces", "own_moments", "own_base_moment"),

@@ -65,6 +65,7 @@ class GeneralRobot(Robot):
     length_limit_mm: float = 30.0
     tool_mm: tuple[float, float, float] = (0.0, 0.0, 0.0)
     up: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    up_stated: bool = True
     point_masses: tuple[PointMass, ...] = ()
     assumed: frozenset[str] = frozenset()
     sample: tuple[FloatArray, FloatArray, Readings | None] | None = None

@@ -35,7 +35,7 @@ class Robot(ABC):
     angle_arm_mm: characteristic length that makes angles comparable with lengths; size_mm: upper bound of the tool's
     distance from the origin; farthest_mm: that of the farthest reachable point, or size_mm; reach_mm: upper bound of
     the tool's distance from a leg's foot; drive_range (K, 2): actuator values between which it works, None where none
-    is stated; up (3,): away from the ground.
+    is stated; up (3,): away from the ground, up_stated: whether its description says so, or it is assumed.
 
     Every attribute that code asks a robot for is named in this class, with its default where most robots have it.
     """
@@ -47,6 +47,7 @@ class Robot(ABC):
     RICHEST: str
     SEARCHED: str
     up: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    up_stated: bool = True
     tool_mm: tuple[float, float, float] = (0.0, 0.0, 0.0)
     # largest loads in N mm or N, and rates in rad/s or mm/s, of the drives (K,) by its file, NaN for a drive without
     # one; None where it states none

@@ -11,6 +11,7 @@ import yaml
 # options of their own; every other key is stated by --set
 _OPTIONS = {"frame": "--frame", "noise_mm": "--noise", "noise_rad": "--noise-rad"}
 _OF_ROBOT = {"tip": "--tip", "base": "--base", "platform": "--platform"}
+_PLACES = {"tool_mm": "--tool", "up": "--up"}
 _KEYS = (
     "frame",
     "unit",
@@ -57,10 +58,11 @@ def as_command(section: Mapping[str, Any], entry: Mapping[str, Any]) -> str:
     file = entry.get("urdf") or entry.get("mjcf")
     robot = [f"--robot {shlex.quote(str(file or section['robot']))}"]
     if file:
-        if set(entry) - {"urdf", "mjcf", "tool_mm", *_OF_ROBOT}:
+        if set(entry) - {"urdf", "mjcf", *_PLACES, *_OF_ROBOT}:
             return ""
         robot += [f"{option} {shlex.quote(entry[key])}" for key, option in _OF_ROBOT.items() if key in entry]
-        robot += [f"--tool {','.join(f'{size:g}' for size in entry['tool_mm'])}"] if "tool_mm" in entry else []
+        places = {option: entry[key] for key, option in _PLACES.items() if key in entry}
+        robot += [f"{option} {','.join(f'{size:g}' for size in place)}" for option, place in places.items()]
     keys = [as_option(key, value) for key, value in section.items() if key not in ("robot", "ingest")]
     return " ".join(["rrru diagnose", shlex.quote(str(section["ingest"])), *robot, *keys])
 

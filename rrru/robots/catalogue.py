@@ -1,6 +1,6 @@
 """The robots by the name that the configuration gives them. Lengths in mm, angles in rad."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
 from typing import Any
 
@@ -57,18 +57,28 @@ def make_mechanism(name: str, section: Mapping[str, Any], **options: Any) -> Rob
 
 def _own(name: str, section: dict[str, Any], options: Mapping[str, Any]) -> Robot:
     """A robot of the user's own from a URDF or MJCF file, DH rows or a Python module."""
-    tool: dict[str, Any] = {"tool_mm": tuple(section.pop("tool_mm"))} if "tool_mm" in section else {}
+    stated: dict[str, Any] = {"tool_mm": tuple(section.pop("tool_mm"))} if "tool_mm" in section else {}
+    if "up" in section:
+        stated["up"] = _direction(name, section.pop("up"))
     if "module" in section:
         own = load_object(f"robot {name}", section["module"])()
         if not isinstance(own, GeneralRobot):
             raise ConfigError(f"robot {name}: {section['module']} gave a {type(own).__name__}; allowed: GeneralRobot")
         if free := free_motions(own.legs, own.up):
             raise ConfigError(f"robot {name}: its platform is free to {'; '.join(free)}; allowed: legs that hold it")
-        return replace(own, name=name, **tool, **options)
+        return replace(own, name=name, **stated, **options)
     if "dh" in section:
-        return from_dh(section.pop("dh"), **section, name=name, **tool, **options)
+        return from_dh(section.pop("dh"), **section, name=name, **stated, **options)
     from rrru.formats import robot_file
 
     read, key = (robot_file.from_urdf, "urdf") if "urdf" in section else (robot_file.from_mjcf, "mjcf")
-    robot: Robot = read(section.pop(key), **section, name=name, **tool, **options)
+    robot: Robot = read(section.pop(key), **section, name=name, **stated, **options)
     return robot
+
+
+def _direction(name: str, up: Sequence[float]) -> tuple[float, ...]:
+    """The unit vector along `up`; raises ConfigError where it has no length."""
+    vector = np.asarray(up, dtype=float)
+    if not vector.any():
+        raise ConfigError(f"robot {name}: up is {', '.join(f'{size:g}' for size in up)}; allowed: a direction")
+    return tuple(vector / np.linalg.norm(vector))

@@ -72,7 +72,7 @@ def serial(
         drive_range=np.asarray(drive_range, dtype=float),
         tool_mm=(x, y, z),
         point_masses=tuple(point_masses),
-        **options,
+        **{"up_stated": "up" in options} | options,
     )
 
 

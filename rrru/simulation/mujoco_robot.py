@@ -1,6 +1,6 @@
 """A robot that MuJoCo simulates from its MJCF, with MuJoCo's own causes of errors: an independent second simulator."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -49,7 +49,7 @@ class MujocoRobot(DrivenRobot):
         edit.payload_kg = float(payload_kg)
         apply(edit, self.causes)
         turn = Rotation.from_rotvec(edit.tilt).inv()
-        edit.spec.option.gravity = turn.apply(edit.nominal.opt.gravity)
+        edit.spec.option.gravity = turn.apply(_gravity(edit.nominal.opt.gravity, self.mechanism.up))
         return Machine(edit, self.file)
 
     @property
@@ -103,3 +103,9 @@ def from_config(mechanism: Robot, dimensions: Mapping[str, Any], section: Mappin
     )
     robot.machine()
     return robot
+
+
+def _gravity(of_file: FloatArray, up: Sequence[float]) -> FloatArray:
+    """A file's gravity (3,) in m/s^2, turned against `up` where the robot's entry states another direction."""
+    against = -np.linalg.norm(of_file) * np.asarray(up)
+    return of_file if np.allclose(of_file, against) else against

@@ -8,7 +8,7 @@ import pytest
 from rrru.campaign import measurements as rows
 from rrru.diagnosis.diagnose import MeasuredRobot, diagnose
 from rrru.diagnosis.make_problem import make_diagnosis_problem
-from rrru.diagnosis.result_notes import MASSES_UNKNOWN
+from rrru.diagnosis.result_notes import MASSES_UNKNOWN, MOUNTING_ASSUMED
 from rrru.diagnosis.settings import GapSettings
 from rrru.diagnosis.verdict_text import answer
 from rrru.effects import drive_error_function
@@ -151,16 +151,18 @@ def test_nothing_is_named_where_nothing_acts(seed):
     assert found.verdict["gap_rms_mm"] < 0.5 * found.verdict["noise_rms_mm"]
 
 
-def _soft(robot, payload_kg, noise_mm=0.02, effects=("drive_compliance", "encoder_eccentricity")):
-    """Diagnosis of an arm with soft joints 2 and 3, by the masses of `robot`; half of the poses carry a payload."""
+def _soft(robot, payload_kg, noise_mm=0.02, effects=("drive_compliance", "encoder_eccentricity"), built=arms.ARM):
+    """Diagnosis of an arm, as `built`, with soft joints 2 and 3, by the masses of `robot`; half of the poses carry a
+    payload.
+    """
     drive, generator = arms.drives(120, np.random.default_rng(4)), np.random.default_rng(5)
     frame = arms.commands(drive)
     frame = frame.assign(payload_kg=np.repeat([0.0, payload_kg], 60), run=np.repeat([1, 2], 60))
     frame = frame.assign(**rows.vector_columns("measured", rows.command(frame)))
     springs = arms.active("drive_compliance", [0.0, 8e-9, 8e-9, 0.0, 0.0, 0.0])
-    motion = make_diagnosis_problem(frame, arms.ARM, arms.MASSES, 1.0, {}).motion
-    twists = arms.ARM.twists_of(arms.ERRORS) + springs.contribute(motion).twists
-    position = arms.ARM.measured(arms.ARM.solve(drive, rows.command(frame), twists), twists)
+    motion = make_diagnosis_problem(frame, built, arms.MASSES, 1.0, {}).motion
+    twists = built.twists_of(arms.ERRORS) + springs.contribute(motion).twists
+    position = built.measured(built.solve(drive, rows.command(frame), twists), twists)
     frame = frame.assign(**rows.vector_columns("measured", position + noise_mm * generator.standard_normal((120, 3))))
     settings = GapSettings(effects, draws=20)
     seen = replace(robot, parameter_set="full").reading(rows.reads(frame))
@@ -227,3 +229,17 @@ def test_a_link_that_grows_alone_is_told_from_a_robot_that_grows(grown):
     assert numbers.loc["time_constant", "low_95"] < constant_s < numbers.loc["time_constant", "high_95"]
     if len(grown) == 1:
         assert found.verdict["leg"] == 2
+
+
+def test_an_arm_on_a_wall_has_its_compliance_by_the_stated_mounting():
+    """The same readings with `up` stated and without it: the note says what is assumed, and disappears."""
+    wall = replace(arms.ARM, up=(1.0, 0.0, 0.0), up_stated=True)
+    found = _soft(wall, 5.0, built=wall)
+    assert found.verdict["effects"] == "drive_compliance"
+    assert MOUNTING_ASSUMED not in answer("a", found.verdict, found.tables)["notes"]
+    numbers = found.tables["gap_parameters"].set_index("parameter")
+    for drive in (2, 3):
+        low, high = numbers.loc[f"compliance{drive}", ["low_95", "high_95"]]
+        assert low < 8e-9 < high
+    assumed = _soft(arms.ARM, 5.0)
+    assert MOUNTING_ASSUMED in answer("a", assumed.verdict, assumed.tables)["notes"]

@@ -243,3 +243,24 @@ def test_loads_under_another_weight_are_those_of_a_robot_that_leans_and_carries_
         scale = max(np.abs(after).max(initial=0.0), 1e-9)
         np.testing.assert_allclose(found, after, rtol=0.0, atol=0.5 * (lean**2).sum() * 2.0 * scale)
         assert not after.size or np.abs(after - before).max() > 1e-3 * scale
+
+
+def test_a_stated_mounting_is_a_turned_base_frame():
+    """Loads of an arm whose entry says how it hangs, against the same arm behind a fixed frame that turns it so."""
+    rows = [
+        {"d_mm": 400.0, "alpha_deg": -90.0, "range_deg": [-150, 150], "mass_kg": 8.0, "com_mm": [0, 150, 0]},
+        {"a_mm": 450.0, "range_deg": [-80, 80], "mass_kg": 6.0, "com_mm": [-220, 0, 0]},
+        {"a_mm": 400.0, "range_deg": [-90, 70], "mass_kg": 4.0, "com_mm": [-90, 10, 30]},
+    ]
+    angles = (20.0, -110.0, 35.0)
+    turned = make_mechanism("turned", {"dh": [{"rpy_deg": list(angles)}, *rows]})
+    against = Rotation.from_euler("xyz", angles, degrees=True).inv().apply([0.0, 0.0, 7.0])
+    stated = make_mechanism("stated", {"dh": rows, "up": against.tolist()})
+    drives = np.random.default_rng(3).uniform(-1.0, 1.0, (20, 3))
+    none = Masses(0.0, 0.0, 0.0)
+    expected, found = (_at_rest(robot, drives, robot.forward(drives), none) for robot in (turned, stated))
+    np.testing.assert_allclose(found.drive, expected.drive, rtol=1e-9, atol=1e-6)
+    np.testing.assert_allclose(np.linalg.norm(found.base, axis=1), np.linalg.norm(expected.base, axis=1), rtol=1e-9)
+    assert stated.up_stated and not turned.up_stated
+    level = make_mechanism("level", {"dh": rows})
+    assert np.abs(_at_rest(level, drives, level.forward(drives), none).drive - expected.drive).max() > 1e3

@@ -239,6 +239,7 @@ _NEVER = {
     *("runs are limited", "causes by share", "no cause is sure"),
     *("an effect is not tested", "the file is not corrected", "how the file was driven", "a part of a sentence"),
     *("a reflector is assumed", "jumps are frequent", "rows without a pose", "masses are unknown"),
+    "the mounting is assumed",
     *("the effects are confounded", "a zero is confounded", "a zero is not determined", "a weight is confounded"),
     *(f"interval of a share: {kind}" for kind in ("covariance", "sampling", "calibration")),
 }

@@ -94,6 +94,7 @@ _NOTES = {
     "repeatability is unsure": r"repeatability is unknown: too few poses were measured twice",
     "the robot repeats": r"poses that were measured again agree better than the noise that was found",
     "masses are unknown": r"no masses of the links are stated: .*",
+    "the mounting is assumed": r"gravity is assumed along -z of the robot's base: .*",
     "an effect needs what is not there": r"(?P<name>\w+) not tested: needs (?P<needs>[\w, ]+), which the columns .*",
     "an effect needs different values": r"(?P<name>\w+) not tested: needs (?P<needs>[\w, ]+) of more than one value",
     "an effect is a calibration's number": r"(?P<name>\w+) not tested: the calibration's own parameters absorb it",
