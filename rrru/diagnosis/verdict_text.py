@@ -221,7 +221,11 @@ def _effect(
 
 
 def _places(numbers: Sequence[Facts]) -> str:
-    """Where an effect acts whose parameters, rows of `gap_parameters`, each belong to one of several legs or drives."""
+    """Where an effect acts whose parameters, rows of `gap_parameters`, each belong to one of several legs or drives.
+
+    A place counts only if one of its parameters is not zero by its 95 % interval; all do where none has such a one.
+    """
+    numbers = [one for one in numbers if one["low_95"] > 0.0 or one["high_95"] < 0.0] or numbers
     places = [place.partition(" ") for place in dict.fromkeys(number["place"] for number in numbers) if place]
     return f"{places[0][0]} {', '.join(name for _, _, name in places)}" if places else ""
 
@@ -471,8 +475,9 @@ def _open(facts: Facts) -> list[str]:
 
 
 def _overlap(facts: Facts) -> bool:
-    """Whether shares of several effects add up to more than the whole by more than is mentioned."""
+    """Whether shares of several parts add up to more than the whole by more than is mentioned."""
     shares = [effect["share"] or 0.0 for effect in facts["effects"]]
+    shares += [part["share"] for part in facts["budget"] if part["kind"] == "unexplained" and facts["unexplained"]]
     return len(shares) > 1 and sum(shares) > 1.0 + OPTIONS.min_mentioned_share
 
 

@@ -101,10 +101,10 @@ def test_a_share_whose_interval_covers_nearly_everything_is_not_determined():
     assert bars["backlash"] == "share not determined" and bars["link flexure"].startswith("60 % (95 %")
 
 
-def test_every_number_of_a_cause_of_several_legs_has_its_place():
+def test_every_number_of_a_cause_of_several_legs_has_its_place_and_the_cause_those_where_it_is_not_zero():
     flexure, backlash = answered()["effects"]
     assert [number["place"] for number in backlash["parameters"]] == ["in leg 1", "in leg 2", "in leg 3"]
-    assert (flexure["place"], backlash["place"]) == ("in leg 2", "in leg 1, leg 2, leg 3")
+    assert (flexure["place"], backlash["place"]) == ("in leg 2", "in leg 1, leg 2")
 
 
 def test_the_error_to_expect_of_a_corrected_file_holds_what_the_diagnosis_leaves():
@@ -140,14 +140,25 @@ def test_a_run_decides_only_where_enough_is_expected_of_it(nats, verb):
     assert said == f"Next: drive line_1 in reverse. That {verb} whether servo lag acts."
 
 
-@pytest.mark.parametrize(("shares", "overlap"), [((1.2, 0.1), True), ((0.6, 0.2), False), ((1.2, None), False)])
-def test_shares_overlap_only_where_there_are_several(shares, overlap):
+@pytest.mark.parametrize(
+    ("shares", "unexplained", "overlap"),
+    [
+        ((1.2, 0.1), None, True),
+        ((0.6, 0.2), None, False),
+        ((1.2, None), None, False),
+        ((0.92, None), 0.87, True),
+        ((0.6, None), 0.3, False),
+    ],
+)
+def test_shares_overlap_only_where_there_are_several(shares, unexplained, overlap):
     budget = synthetic_gap.gap_budget(CAMPAIGN)
-    for name, share in zip(("link_flexure", "backlash"), shares, strict=True):
+    for name, share in zip(("link_flexure", "backlash", "unexplained"), (*shares, unexplained), strict=True):
         budget.loc[budget["part"] == name, "share"] = share or 0.0
     effects = "link_flexure+backlash" if shares[1] else "link_flexure"
+    effects += "+unexplained" if unexplained else ""
     said = " ".join(answered(budget=budget, effects=effects)["sentences"])
     assert ("These shares add up to more than the gap" in said) == overlap
+    assert ("and of what is unexplained cancel" in said) == (overlap and unexplained is not None)
 
 
 def test_confounded_causes_are_one_sentence_with_their_probabilities():

@@ -22,6 +22,7 @@ from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.problem import DiagnosisProblem
 from rrru.diagnosis.result_notes import payload_notes
 from rrru.diagnosis.result_tables import parameter_rows
+from rrru.estimation.intervals import QUANTILE_95
 from rrru.formats.file_changes import Found, held_by
 from rrru.formats.mjcf_writer import to_mjcf
 from rrru.formats.robot_file import mjcf_parts, urdf_parts
@@ -124,6 +125,12 @@ def _of_drives(numbers: pd.DataFrame, effect: str, stem: str, count: int) -> dic
     return {k: tuple(of_effect.loc[f"{stem}{k + 1}", columns]) for k in range(count) if len(of_effect)}
 
 
+def _determined(sizes: Mapping[int, tuple[float, float]]) -> dict[int, tuple[float, float]]:
+    """(value, standard error) by drive of those that are not zero by their 95 % interval; all where none is."""
+    chosen = {k: (value, error) for k, (value, error) in sizes.items() if not value <= QUANTILE_95 * error}
+    return chosen or dict(sizes)
+
+
 def _places(problem: DiagnosisProblem, stated: bool) -> dict[str, FloatArray]:
     """Places (3,) on the platform, before what was found, by site: of reflectors that were found, or stated, too."""
     reads = problem.mechanism.reads
@@ -158,7 +165,7 @@ def corrected(inference: InferenceResult, section: dict[str, Any], folder: Path)
     others += payload_notes(inference)
     if "urdf" in section:
         chain = {key: section.get(key) for key in ("base", "tip", "home")}
-        found = replace(found, compliance=diagnosed.compliance, play=diagnosed.play)
+        found = replace(found, compliance=_determined(diagnosed.compliance), play=_determined(diagnosed.play))
         text, lost = to_urdf(section["urdf"], found, folder, **chain)
         return Corrected(text, (*others, *lost), tuple(lacking), found)
     text, lost = to_mjcf(section["mjcf"], section["platform"], found, folder)
