@@ -29,6 +29,11 @@ _LEAST_SHARE = 0.005
 Facts: TypeAlias = Mapping[str, Any]
 # no instrument resolves less
 _LEAST_MM = 0.001
+# said next to a corrected file where the instrument's frame was fitted to the commanded points
+_REGISTERED = (
+    "Its positions are in the robot's frame: readings of the instrument have to be turned into it by the table "
+    "registration before they are compared."
+)
 
 
 @dataclass(frozen=True)
@@ -109,7 +114,7 @@ def card(
         facts["notes"],
         [] if _not_corrected(facts) else list(models),
         "" if facts["no_answer"] else drives,
-        _file_worth(facts),
+        _file_worth(facts, found is not None and found.registered),
         [] if facts["no_answer"] else _parts(facts["budget"]),
         _steps(facts),
     )
@@ -151,8 +156,8 @@ def _not_corrected(facts: Facts) -> str:
     return lacking if lacking.startswith(NOT_CORRECTED) else ""
 
 
-def _file_worth(facts: Facts) -> list[str]:
-    """Sentences on the errors of the corrected file, which are next to its link."""
+def _file_worth(facts: Facts, registered: bool) -> list[str]:
+    """Sentences on the errors of the corrected file, which are next to its link; registered: the instrument's frame."""
     if why := _not_corrected(facts):
         return [f"Your robot's file was {why}."]
     if not (file := facts.get("corrected_file")):
@@ -167,7 +172,8 @@ def _file_worth(facts: Facts) -> list[str]:
         f"That leaves out the error of the diagnosed robot itself, {after} at held-out points. With it {both} are to "
         "be expected at poses and loads like those measured; elsewhere the error may be larger."
     )
-    return [said, left_out, *([f"{file['remainder'][0].upper()}{file['remainder'][1:]}."] if file["remainder"] else [])]
+    result = [said, left_out, _REGISTERED] if registered else [said, left_out]
+    return [*result, *([f"{file['remainder'][0].upper()}{file['remainder'][1:]}."] if file["remainder"] else [])]
 
 
 def _file_error(size_mm: float | None) -> str:

@@ -15,6 +15,7 @@ from rrru.diagnosis import verdict_text
 from rrru.diagnosis.result_notes import REPEATABILITY_UNKNOWN, REPEATABILITY_UNSURE, ROBOT_REPEATS
 from rrru.effects.causes import cause_texts
 from rrru.report.cards import card
+from rrru.report.worth import Worth
 from rrru.robots.catalogue import make_mechanism
 from rrru.robots.drive_words import DriveWords, drive_words
 from rrru.store import json_files
@@ -113,6 +114,10 @@ def test_the_error_to_expect_of_a_corrected_file_holds_what_the_diagnosis_leaves
     facts = answered(**file)
     assert facts["corrected_file"]["expected_mm"] == pytest.approx(0.05)
     assert "0.030 mm at held-out points. With it 0.050 mm are to be expected" in " ".join(card(facts).worth)
+    # the file does not know where the instrument stood
+    registered = card(facts, found=Worth(100, 0.3, 0.1, True)).worth
+    assert any("turned into it by the table registration" in said for said in registered)
+    assert not any("registration" in said for said in card(facts, found=Worth(100, 0.3, 0.1, False)).worth)
 
 
 def test_the_sentences_say_what_acts_how_much_how_sure_and_what_next():
