@@ -7,7 +7,7 @@ is "unexplained".
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 from numpy.polynomial import chebyshev
@@ -22,14 +22,14 @@ _DRIVE_ORDERS, _TIME_ORDERS = (1, 2, 3, 4, 5, 6), (1, 2, 3)
 
 @dataclass(frozen=True)
 class Unknown:
-    """A smooth function; basis: motion, or a drive's values per_leg, to (n, k) functions of about unit size.
+    """A smooth function; basis: motion to functions (n, k), or (n, K, k) of each drive, of about unit size.
 
     per_leg: added to each actuator value, else to each axis; typical: size of coefficients in the drive's unit or mm.
     """
 
     name: str
     follows: str
-    basis: Callable[[Any], FloatArray]
+    basis: Callable[[Motion], FloatArray]
     count: int
     needs: tuple[str, ...]
     per_leg: bool = False
@@ -48,17 +48,18 @@ class Unknown:
 
     def contribute(self, motion: Motion, values: FloatArray) -> Contribution:
         """Changes under coefficients (drives or axes times k,)."""
-        coefficients = np.reshape(values, (-1, self.count))
+        coefficients, functions = np.reshape(values, (-1, self.count)), self._cached(motion)
         if self.per_leg:
-            functions = self._cached(motion, lambda: np.stack([self.basis(drive) for drive in motion.drive.T], axis=1))
-            return motion.at_drives(np.einsum("nlk,lk->nl", functions, coefficients))
-        shift = self._cached(motion, lambda: self.basis(motion)) @ coefficients.T
+            each = functions if functions.ndim == 3 else functions[:, None]
+            each = np.broadcast_to(each, (len(each), *coefficients.shape))
+            return motion.at_drives(np.einsum("nlk,lk->nl", each, coefficients))
+        shift = functions @ coefficients.T
         return motion.at({WORLD: np.concatenate([shift, np.zeros_like(shift)], axis=1)})
 
-    def _cached(self, motion: Motion, make: Callable[[], FloatArray]) -> FloatArray:
+    def _cached(self, motion: Motion) -> FloatArray:
         """The functions along a motion, computed once."""
         if self.name not in motion.cache:
-            motion.cache[self.name] = make()
+            motion.cache[self.name] = self.basis(motion)
         functions: FloatArray = motion.cache[self.name]
         return functions
 
@@ -74,9 +75,9 @@ def _chebyshev(values: FloatArray, orders: tuple[int, ...]) -> FloatArray:
     return np.asarray(chebyshev.chebvander(_unit(values), max(orders))[:, orders], dtype=float)
 
 
-def _of_angle(angle: FloatArray) -> FloatArray:
-    """Chebyshev functions (n, k) of one drive's values."""
-    return _chebyshev(angle, _DRIVE_ORDERS)
+def _of_drives(motion: Motion) -> FloatArray:
+    """Chebyshev functions (n, K, k) of each drive's values."""
+    return np.stack([_chebyshev(drive, _DRIVE_ORDERS) for drive in motion.drive.T], axis=1)
 
 
 def _of_time(motion: Motion) -> FloatArray:
@@ -103,7 +104,8 @@ Library: TypeAlias = Mapping[str, TestedEffect]
 UNKNOWN = {
     function.name: function
     for function in (
-        Unknown("unknown_drive", "the drives", _of_angle, len(_DRIVE_ORDERS), (), True, 1e-4),
+        Unknown("unknown_drive", "the drives", _of_drives, len(_DRIVE_ORDERS), (), True, 1e-4),
+        Unknown("unknown_zeros", "the time, drive by drive", _of_time, len(_TIME_ORDERS), ("time_s",), True, 1e-4),
         Unknown("unknown_drift", "the time", _of_time, len(_TIME_ORDERS), ("time_s",)),
         Unknown(
             "unknown_affine",

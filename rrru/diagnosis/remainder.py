@@ -1,11 +1,12 @@
 """The unexplained part of a gap: which variable it depends on, how smoothly, and how large it is.
 
 A Gaussian process of one variable at a time is fitted to the residuals of the verdict's model with its calibration. It
-is a function f of a drive's value, which moves the positions by J f (J: derivative by the drive). Or it is a function
-of the place, the time, the payload or the speed for each axis, or steps with the sense of motion of the drives. Its
-covariance is a^2 exp(-d^2 / (2 l^2)) of the distance d, by its values at inducing points (C. Rasmussen and C. Williams,
-Gaussian Processes for Machine Learning, 2006, sec. 8.3); a and l have the highest marginal likelihood of a grid. Each
-fold, a fifth of all stretches of five points, is predicted from the others.
+is a function f of a drive's value, or of the time, that is added to the drive and moves the positions by J f (J:
+derivative by the drive). Or it is a function of the place, the time, the payload or the speed for each axis, or steps
+with the sense of motion of the drives. Its covariance is a^2 exp(-d^2 / (2 l^2)) of the distance d, by its values at
+inducing points (C. Rasmussen and C. Williams, Gaussian Processes for Machine Learning, 2006, sec. 8.3); a and l have
+the highest marginal likelihood of a grid. Each fold, a fifth of all stretches of five points, is predicted from the
+others.
 """
 
 from collections.abc import Collection, Iterator
@@ -30,6 +31,7 @@ NO_REMAINDER = pd.DataFrame(columns=COLUMNS)
 # deviations of the function over the rms of the remainder
 _AMPLITUDES = (0.3, 1.0, 3.0)
 _JITTER = 1e-8
+_TIME = "the time"
 
 
 @dataclass(frozen=True)
@@ -112,7 +114,7 @@ def _without_calibration(values: FloatArray, linear: LinearizedProblem, rows: Bo
 
 def _depends_on(effect: Effect, follows: str) -> bool:
     """Whether an effect depends on the variable, in words, and on no other except those that it determines."""
-    return "time_s" in effect.needs if follows == "the time" else not effect.needs
+    return "time_s" in effect.needs if follows.startswith(_TIME) else not effect.needs
 
 
 def _variables(problem: DiagnosisProblem, rows: BoolArray) -> list[_Variable]:
@@ -124,8 +126,12 @@ def _variables(problem: DiagnosisProblem, rows: BoolArray) -> list[_Variable]:
         _Variable(f"the value of {name}", motion.drive[at, k : k + 1], unit, k)
         for k, (name, unit) in enumerate(zip(names, units, strict=False))
     ]
+    time_s = motion.time_s[at][:, None]
+    found += [
+        _Variable(f"{_TIME}, in the zero of {name}", time_s, "s", k) for k, name in enumerate(names[: len(units)])
+    ]
     found.append(_Variable("the place", motion.position_mm[at], "mm"))
-    found.append(_Variable("the time", motion.time_s[at][:, None], "s"))
+    found.append(_Variable(_TIME, time_s, "s"))
     found.append(_Variable("the payload", motion.payload_kg[at][:, None], "kg"))
     speed = problem.points["speed_mm_s"].to_numpy(dtype=float)[rows]
     found.append(_Variable("the speed", speed[:, None], "mm/s"))

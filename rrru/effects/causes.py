@@ -238,6 +238,15 @@ CAUSES = {
         "the temperature of use.",
         f"{_ISO_9283}, drift of pose characteristics; {_THERMAL}; Mayr et al., CIRP Annals 61, 2012",
     ),
+    "zero_drift": Cause(
+        "the zeros of the drives move with time towards a limit while motors and gears warm up",
+        "Measure one pose again and again from a cold start, with the temperature of each motor and gear. Drive each "
+        "joint to its mark or reference switch before and after a run; look for a coupling, belt or encoder seat that "
+        "slips.",
+        "Warm the robot up before measuring and before work; reference the drives again in between; tighten what "
+        "slips.",
+        f"{_ISO_9283}, drift of pose characteristics; Heisel et al., CIRP Annals 46, 1997",
+    ),
     "thermal_expansion": Cause(
         "all links have the length that belongs to the temperature that was measured",
         "Compare the robot's temperature at several places with the probe's; look for heat from motors, sun or doors.",

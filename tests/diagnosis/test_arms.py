@@ -243,3 +243,25 @@ def test_an_arm_on_a_wall_has_its_compliance_by_the_stated_mounting():
         assert low < 8e-9 < high
     assumed = _soft(arms.ARM, 5.0)
     assert MOUNTING_ASSUMED in answer("a", assumed.verdict, assumed.tables)["notes"]
+
+
+@pytest.mark.parametrize(("law", "joint"), [("warming", 2), ("warming", 4), ("slip", 3)])
+def test_a_zero_that_moves_is_that_drives_whatever_else_changes_with_time(law, joint):
+    """Positions of the arm at drive values that nobody commanded. A slip follows no law of the library."""
+    generator, count, size = np.random.default_rng(joint), 120, 6e-4
+    drive, time = arms.drives(count, generator), 20.0 * np.arange(count)
+    frame = arms.commands(drive).assign(time_s=time)
+    share = -np.expm1(-time / 900.0) if law == "warming" else (time > time.mean()).astype(float)
+    stands = drive + size * np.outer(share, np.arange(6) == joint - 1)
+    twists = arms.ARM.twists_of(arms.ERRORS)
+    position = arms.ARM.measured(arms.ARM.solve(stands, arms.ARM.forward(stands), twists), twists)
+    frame = frame.assign(**rows.vector_columns("measured", position + 0.02 * generator.standard_normal((count, 3))))
+    found = diagnose(frame, MeasuredRobot(arms.reading(frame), arms.MASSES, 0.02), GapSettings(draws=20))
+    if law == "slip":
+        assert set(found.verdict["effects"].split("+")) <= {"zero_drift", "unexplained"}
+        assert found.tables["gap_remainder"]["follows"].iloc[0] == f"the time, in the zero of joint {joint}"
+        return
+    assert found.verdict["effects"] == "zero_drift" and found.verdict["leg"] == joint
+    numbers = found.tables["gap_parameters"].query("effect == 'zero_drift'").set_index("parameter")
+    low, high = numbers.loc[f"drift{joint}", ["low_95", "high_95"]]
+    assert low < size < high
