@@ -4,10 +4,13 @@ Step, acceptance, convergence and covariance come from the same penalised, white
 
     F(x) = 1/2 sum rho(r_i^2) + 1/2 sum ((x_j - m_j) / s_j)^2,    r = W (y - h(x))
 
-The steps are Levenberg's and Marquardt's with the damping rule of Nielsen (Damping parameter in Marquardt's method,
-IMM-REP-1999-05), in units of the priors' standard deviations. A damped step keeps combinations that the readings do not
-determine near the prior mean, so that no search creeps along a curved valley. Parameters at a bound that the gradient
-presses against are held (Kanzow, Yamashita and Fukushima, Journal of Computational and Applied Mathematics 172, 2004).
+The steps are Levenberg's and Marquardt's, in units of the priors' standard deviations. A damped step keeps combinations
+that the readings do not determine near the prior mean. A step that gains less than half of what was predicted is bent
+as the readings bend (the second-order correction along the step: Transtrum and Sethna, Improvements to the
+Levenberg-Marquardt algorithm, arXiv:1201.5885, 2012) and, if need be, cut where a parabola through the objective is
+least: so a search follows the curved valley of two factors of one product, such as a compliance and a load. Parameters
+at a bound that the gradient presses against are held (Kanzow, Yamashita and Fukushima, Journal of Computational and
+Applied Mathematics 172, 2004).
 """
 
 from collections.abc import Callable, Iterable
@@ -17,7 +20,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import solve_triangular
 
-from rrru.arrays import FloatArray
+from rrru.arrays import BoolArray, FloatArray, IntArray
 from rrru.errors import FitError
 from rrru.estimation.estimate import Estimate, SearchEnd, triangle_of, with_prior
 from rrru.estimation.problem import Problem
@@ -48,6 +51,10 @@ class SolverOptions:
 _LEAST_DAMPING = 1e-13
 # damping, times two, after the first step that does not lower the objective
 _RETRY_DAMPING = 1e-3
+# the damping falls by this after a step that gains at least this share of the prediction
+_FALL, _WELL_PREDICTED = 0.1, 0.5
+# a step is not cut to less than this share
+_SHORTEST = 0.05
 _Function = Callable[[FloatArray], FloatArray]
 # rho(z) and its derivative by z, the squared residual in units of the loss scale (as scipy names them)
 _LOSSES: dict[str, tuple[_Function, _Function]] = {
@@ -139,7 +146,8 @@ class _Search:
         """Search until the options say that it has ended."""
         options, damping, growth = self._options, self._options.first_damping, 2.0
         for _ in range(options.max_iterations):
-            triangle = self._penalized(self._linearized())
+            white = self._linearized()
+            triangle = self._penalized(white)
             free = np.flatnonzero(self._free(triangle))
             linearized = _Linearized(
                 triangle if len(free) == len(self.values) else triangle_of(triangle[:, [*free, len(self.values)]]),
@@ -148,29 +156,53 @@ class _Search:
                 (self._problem.parameters.high - self.values)[free],
             )
             least = max(0.25 * options.step_tolerance**2, options.cost_tolerance * self.cost)
-            if linearized.step(_LEAST_DAMPING)[1] <= least:
+            if linearized.step(_LEAST_DAMPING).gain <= least:
                 self._end()
                 return
             while True:
-                change, predicted = linearized.step(damping)
-                step = np.zeros(len(self.values))
-                step[free] = change
-                trial = self._problem.parameters.clipped(self.values + step)
-                residual, cost = self._evaluate(trial)
-                if cost < self.cost:
+                step = linearized.step(damping)
+                trial = self._tried(step, free, white)
+                if trial.cost < self.cost:
                     break
-                if predicted <= max(least, options.rounding * self.cost):
+                if step.gain <= max(least, options.rounding * self.cost):
                     self._end()
                     return
                 damping, growth, self.straight = max(damping, _RETRY_DAMPING) * growth, 2.0 * growth, False
                 if damping > options.max_damping:
                     self.message = "no step lowers the objective"
                     return
-            ratio = (self.cost - cost) / max(predicted, 1e-300)
-            damping, growth = damping * max(1.0 / 30.0, 1.0 - (2.0 * min(ratio, 1.0) - 1.0) ** 3), 2.0
-            if ratio < 0.5:
-                self.straight = False
-            self.values, self.residual, self.cost = trial, residual, cost
+            if self.cost - trial.cost >= _WELL_PREDICTED * step.gain:
+                damping *= _FALL
+            growth = 2.0
+            self.values, self.residual, self.cost = trial.values, trial.residual, trial.cost
+
+    def _tried(self, step: "_Step", free: IntArray, white: FloatArray) -> "_Trial":
+        """The best _Trial of a step of the free parameters (k,): the step itself where it gains what is predicted, or
+        nearly so, else also the bent one, and else the cut one. white (n a, p + 1): of `_linearized`.
+        """
+        trial = self._along(step.change, free)
+        gained, wanted = self.cost - trial.cost, _WELL_PREDICTED * step.gain
+        if not gained < wanted or not np.isfinite(gained):
+            return trial
+        self.straight = False
+        if self._problem.loss == "linear":
+            beyond = trial.residual.ravel() - white[:, -1] - white[:, free] @ step.change
+            bent = self._along(step.change + step.correction(white[:, free].T @ beyond), free)
+            trial = min(trial, bent, key=lambda one: one.cost)
+            if self.cost - trial.cost >= wanted:
+                return trial
+        # where the parabola through both ends, with the slope at the first, is least
+        share = 0.5 * step.slope / (step.slope - gained)
+        if share > _SHORTEST:
+            trial = min(trial, self._along(share * step.change, free), key=lambda one: one.cost)
+        return trial
+
+    def _along(self, change: FloatArray, free: IntArray) -> "_Trial":
+        """The _Trial after a change (k,) of the free parameters, within the bounds."""
+        values = self.values.copy()
+        values[free] += change
+        values = self._problem.parameters.clipped(values)
+        return _Trial(values, *self._evaluate(values))
 
     def _end(self) -> None:
         """Note that the search is at a minimum."""
@@ -191,6 +223,39 @@ class _Search:
 
 
 @dataclass(frozen=True, eq=False)
+class _Trial:
+    """Values (p,), their whitened residual (n, a) and objective."""
+
+    values: FloatArray
+    residual: FloatArray
+    cost: float
+
+
+@dataclass(frozen=True, eq=False)
+class _Step:
+    """A damped step: change (k,); gain: by how much it lowers the linearised objective; slope: how fast this falls at
+    its beginning. unit (f,) and triangle (f, f): of the damped problem of those of the parameters, inside (k,), that
+    are not put at a bound.
+    """
+
+    change: FloatArray
+    gain: float
+    slope: float
+    inside: BoolArray
+    unit: FloatArray
+    triangle: FloatArray
+
+    def correction(self, pull: FloatArray) -> FloatArray:
+        """Change (k,) that answers readings beyond the linear model by a pull J^T d (k,)."""
+        result = np.zeros(len(self.change))
+        if not self.inside.any():
+            return result
+        halfway = solve_triangular(self.triangle, self.unit * pull[self.inside], trans="T")
+        result[self.inside] = -self.unit * solve_triangular(self.triangle, halfway)
+        return result
+
+
+@dataclass(frozen=True, eq=False)
 class _Linearized:
     """A linearised problem: triangle (k + 1, k + 1), priors' sd (k,), and bounds low, high (k,) of the step."""
 
@@ -199,8 +264,8 @@ class _Linearized:
     low: FloatArray
     high: FloatArray
 
-    def step(self, damping: float) -> tuple[FloatArray, float]:
-        """Damped Gauss-Newton step (k,) within the bounds, and by how much it lowers the objective.
+    def step(self, damping: float) -> _Step:
+        """Damped Gauss-Newton _Step within the bounds.
 
         Parameters count in units of their priors, those of flat priors by the length of their column; damping: in these
         units, so that 1 shortens a step to about the priors' standard deviations. A parameter that would leave its
@@ -209,7 +274,7 @@ class _Linearized:
         columns, target, count = self.triangle[:, :-1], self.triangle[:, -1], len(self.sd)
         length = np.linalg.norm(columns, axis=0)
         unit = np.where(np.isfinite(self.sd), self.sd, 1.0 / np.where(length > 0.0, length, 1.0))
-        free, step = np.ones(count, dtype=bool), np.zeros(count)
+        free, step, damped = np.ones(count, dtype=bool), np.zeros(count), np.zeros((1, 1))
         while free.any():
             remaining = target + columns[:, ~free] @ step[~free]
             scaled = np.column_stack([columns[:, free] * unit[free], remaining])
@@ -222,4 +287,5 @@ class _Linearized:
             step[beyond] = np.clip(step, self.low, self.high)[beyond]
             free &= ~beyond
         moved = columns @ step
-        return step, -float(target @ moved + 0.5 * moved @ moved)
+        slope = -float(target @ moved)
+        return _Step(step, slope - 0.5 * float(moved @ moved), slope, free, unit[free], damped[:-1, :-1])

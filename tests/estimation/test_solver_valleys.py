@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from scipy.linalg import null_space
+from scipy.optimize import least_squares
 
 from rrru.errors import FitError
 from rrru.estimation.parameters import Block, Parameters
@@ -40,6 +41,23 @@ class Circle:
         """Derivative (1, 1, 2) of the residual."""
         step = values + np.array([0.0, self._radius])
         return -(step / np.linalg.norm(step))[None, None]
+
+
+class Springs:
+    """Deflections (n, 1) c_k (f_i + m) of springs under forces f (n,) and one more that is not known."""
+
+    def __init__(self, spring, force, read):
+        self._of, self._force, self._read, self.derivatives = np.eye(spring.max() + 1)[spring], force, read, 0
+
+    def residual(self, values, /):
+        """Read minus predicted (n, 1)."""
+        return (self._read - self._of @ values[:-1] * (self._force + values[-1]))[:, None]
+
+    def jacobian(self, values, /):
+        """Derivative (n, 1, p) of the residual."""
+        self.derivatives += 1
+        own = self._of * (self._force + values[-1])[:, None]
+        return -np.column_stack([own, self._of @ values[:-1]])[:, None]
 
 
 def _problem(seed):
@@ -86,3 +104,27 @@ def test_an_estimate_at_values_is_linearised_there():
     assert again.end.cost == pytest.approx(found.end.cost)
     with pytest.raises(FitError, match="the model predicts no reading at the values of a search; its end: lost"):
         estimate_at(problem, np.full(4, np.nan), "lost")
+
+
+@pytest.mark.parametrize("start", [0.0, 2.0, 15.0])
+@pytest.mark.parametrize("further", [4.0, 12.0])
+def test_a_product_of_two_unknowns_is_followed_in_few_steps(further, start):
+    """Where all forces are alike, only products of compliances and force are known well; scipy gives the minimum."""
+    generator = np.random.default_rng(int(further))
+    spring, force = np.arange(60) % 6, generator.uniform(4.0, 5.0, 60)
+    compliance, noise = generator.uniform(0.5, 1.5, 6), 1e-3
+    read = compliance[spring] * (force + further) + noise * generator.standard_normal(60)
+    springs = Springs(spring, force, read)
+    blocks = Block.of("c", [f"c{k}" for k in range(6)], ["mm"] * 6, 3.0), Block.of("m", ["m"], ["kg"], 0.5)
+    problem = Problem(springs, Parameters(blocks), WhiteNoise(noise))
+    found = solve(problem, [np.concatenate([np.zeros(6), [start]])])
+    assert found.end.converged and springs.derivatives <= 16
+    sd = np.concatenate([np.full(6, 3.0), [0.5]])
+
+    def stack(values):
+        return np.concatenate([springs.residual(values).ravel() / noise, values / sd])
+
+    least = least_squares(
+        stack, np.concatenate([compliance, [further]]), x_scale=sd, xtol=1e-15, ftol=1e-15, gtol=1e-15
+    )
+    assert found.end.cost <= least.cost * (1.0 + 1e-9)
