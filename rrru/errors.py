@@ -35,6 +35,10 @@ class IngestError(RrruError):
         super().__init__("\n".join(_problem_text(p) for p in self.problems))
 
 
+class MistakeError(IngestError):
+    """A measurement file is refused for a mistake that explains it in any units and any frame of the instrument."""
+
+
 class UnreachableError(RrruError):
     """A commanded pose lies outside the reachable workspace."""
 

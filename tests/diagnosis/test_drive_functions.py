@@ -58,7 +58,9 @@ def test_an_effect_that_is_no_function_of_a_drive_s_value_has_no_rows():
     assert drive_functions(SimpleNamespace(problem=problem, fit=fit), NAMES).empty
 
 
-def test_a_function_of_many_coefficients_is_what_steps_of_each_of_them_give():
+def test_a_function_of_many_coefficients_is_what_steps_of_each_of_them_give(monkeypatch):
+    # the slow way takes seconds for each place
+    monkeypatch.setattr("rrru.diagnosis.drive_functions._PLACES", 31)
     name = "drive_error_function"
     problem = arms.problem_of(arms.measure(count=60), name)
     fit = fit_model(problem, [calibrate(problem)], [EffectTerm(name)], 3.0 * problem.library[name].coordinates.typical)

@@ -31,7 +31,7 @@ from rrru.campaign.ingest.registration import Registration, register
 from rrru.campaign.ingest.sheet import COMMAND, MEASURED, NOISE, TARGET, TURNS, Sheet, rows_text
 from rrru.campaign.ingest.spec import MM, IngestSpec
 from rrru.campaign.measurements import command, measured, turn_columns, turns, vector_columns
-from rrru.errors import ConfigError, FitError
+from rrru.errors import ConfigError, FitError, IngestError, MistakeError
 from rrru.kinematics.robot import Robot
 
 
@@ -171,7 +171,12 @@ def _refuse(sheet: Sheet, gross: GrossError, driven: bool) -> None:
         )
         allowed += "its description, the columns of its drives (`columns`) and the measured rows belong to each other"
     concerned = sheet.drives if driven and not gross.mistakes.of_readings else MEASURED
-    sheet.refuse_now(concerned, value, allowed)
+    try:
+        sheet.refuse_now(concerned, value, allowed)
+    except IngestError as error:
+        # other units have been tried along with all other mistakes, and the instrument's frame is registered
+        explained = gross.limit_mm is None and not gross.mistakes.of_units
+        raise (MistakeError if explained else IngestError)(error.problems) from None
 
 
 def _at_tool(sheet: Sheet, mounted: Mounting | None) -> Sheet:

@@ -56,6 +56,11 @@ class Mistakes:
         return self == replace(self, signs=right.signs, order=right.order, drive_unit=None, angle_unit=None)
 
     @property
+    def of_units(self) -> bool:
+        """Whether a unit is wrong."""
+        return {self.unit, self.drive_unit, self.angle_unit} != {None}
+
+    @property
     def _reordered(self) -> bool:
         return self.order != tuple(sorted(self.order))
 

@@ -22,7 +22,7 @@ from rrru.campaign.ingest.problems import Problems
 from rrru.campaign.ingest.sheet import COMMAND
 from rrru.campaign.ingest.spec import MM, RAD, IngestSpec
 from rrru.campaign.stated_motion import STOP_AND_GO
-from rrru.errors import IngestError, Problem, RrruError
+from rrru.errors import IngestError, MistakeError, Problem, RrruError
 from rrru.kinematics.robot import Robot
 from rrru.pipeline import config as parts
 from rrru.pipeline import setup
@@ -153,7 +153,8 @@ def _fitting(section: Section, cells: Cells, mechanism: Robot) -> Proposal:
     """The Proposal with the first units and frame for which ingest accepts the file.
 
     Stated units and frame stay; those in the file's header are tried first. Where none fits, the section has those of
-    the first attempt with the fewest problems of whole columns; a unit does not affect problems of single rows.
+    the first attempt with the fewest problems of whole columns; a unit does not affect problems of single rows, or a
+    mistake of another kind.
     """
     choices = {"frame": ("robot", "register"), "unit": tuple(MM), "angle_unit": tuple(RAD)}
     usual = {key: values[0] for key, values in choices.items()}
@@ -168,8 +169,8 @@ def _fitting(section: Section, cells: Cells, mechanism: Robot) -> Proposal:
             return Proposal(stated, cells, mechanism, ingest(IngestSpec.from_config(stated), mechanism), ())
         except IngestError as error:
             attempts.append(Proposal(stated, cells, mechanism, None, error.problems))
-        if all(problem["row"] is not None for problem in attempts[-1].refused):
-            break
+            if isinstance(error, MistakeError) or all(problem["row"] is not None for problem in error.problems):
+                break
     return min(attempts, key=lambda attempt: _of_all_rows(attempt.refused))
 
 
