@@ -207,6 +207,7 @@ def _row(
     problem, noise = inference.problem, inference.problem.noise or NoiseModel.white(inference.problem.noise_mm)
     return {
         "effects": verdict.label,
+        "unnamed": "+".join(t.effect for t in inference.hypothesis.terms if t.effect not in verdict.effects),
         "probability": verdict.probability,
         "leg": verdict.leg,
         "where": where(inference, verdict.effects),
@@ -244,23 +245,26 @@ def _decide(
     The probabilities come from the evidence, and cross-validation has a veto. An effect that predicts left-out points
     worse than the verdict without it, by more than chance, is ruled out, and the others are decided again. Where
     something is unexplained an effect may be a part of that: it has to predict them better, and to make more than a
-    small part of the gap, to be named.
+    small part of the gap, to be named. One that predicts them better and is too small for a name stays in the model.
     """
     ruled_out: set[str] = set()
     small: frozenset[str] = frozenset()
+    unnamed: tuple[str, ...] = ()
     while True:
         if inference.lacks_fit:
             inference = inference.with_posterior(inference.posterior.all_unexplained())
         verdict = decide(inference.posterior, inference.problem.effects, small)
-        fitted = with_effects(inference, verdict.effects)
+        fitted = with_effects(inference, (*verdict.effects, *(name for name in unnamed if name not in ruled_out)))
         least = OPTIONS.max_heldout_loss_nats if verdict.unexplained else -OPTIONS.max_heldout_loss_nats
         worse = {name for name, gain in _gains(fitted).items() if gain < least}
         if not worse:
             ordered = order_by_share(fitted)
             # decided once, with all effects fitted: an effect that is left out would be a part of the remainder
             if not small and (small := _small(fitted, {term.effect: share for term, share in ordered}, verdict)):
+                unnamed = tuple(name for name in verdict.effects if name in small)
                 continue
-            return replace(verdict, effects=tuple(term.effect for term, _ in ordered)), fitted, ordered
+            named = tuple(term.effect for term, _ in ordered if term.effect in verdict.effects)
+            return replace(verdict, effects=named), fitted, ordered
         ruled_out |= worse
         inference = inference.with_posterior(_without(inference, ruled_out, worse, prior))
 

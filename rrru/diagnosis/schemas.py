@@ -18,6 +18,8 @@ values are of 3-D distances.
 campaign
 effects                str    names joined by + in the order of their share; none; unexplained where the library does
     not hold it
+unnamed                str    names joined by + of effects that the corrected model has as well: they predict left-out
+    points better, but may be a part of what is unexplained; empty where there are none
 probability            float  that exactly these effects act, or that these and something unexplained do, 0 to 1; 1
     where there is no answer. gap_attribute has that of each effect
 leg                    int    the one leg or drive at fault, from 1 on; 0 for all or none

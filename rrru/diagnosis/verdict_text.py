@@ -72,6 +72,7 @@ def answer(
         "schema": SCHEMA,
         "campaign": campaign,
         "effects": [_effect(name, tables, budget, drives) for name in names],
+        "unnamed": [name for name in verdict["unnamed"].split("+") if name],
         "unexplained": "unexplained" in verdict["effects"].split("+"),
         "probability": _clipped(verdict["probability"]),
         "leg": verdict["leg"] or None,
@@ -126,7 +127,7 @@ def sentences(facts: Facts) -> list[str]:
     file = facts["corrected_file"] or {"headline": ""}
     said = [f"{file['headline'][0].upper()}{file['headline'][1:]}."] if file["headline"] else []
     said += [_missed(facts), *_causes(facts), *_scatter(facts)]
-    said += _left(facts) if facts["effects"] else []
+    said += _left(facts) if facts["effects"] or facts["unnamed"] else []
     return [*said, *_open(facts), *_next(facts)]
 
 
@@ -452,7 +453,11 @@ def _scatter_parts(facts: Facts, least: float = 0.0) -> list[Facts]:
 def _left(facts: Facts) -> list[str]:
     """Residual error with the effects in the simulator."""
     after, noise = (rounded(facts[name]) for name in ("gap_after_rms_mm", "noise_rms_mm"))
-    what = "it" if len(facts["effects"]) == 1 else "them"
+    parts = [] if not facts["effects"] else ["it"] if len(facts["effects"]) == 1 else ["them"]
+    if facts["unnamed"]:
+        # causes that may act, of which each predicts left-out points better
+        parts.append(f"what may act as well ({', '.join(map(readable, facts['unnamed']))})")
+    what = " and ".join(parts)
     size = f"{after} mm; the noise is {noise} mm"
     return [f"With {what} in the simulator the residual error at left-out points is {size}."]
 

@@ -203,7 +203,7 @@ def _parts(budget: Sequence[Facts]) -> list[Part]:
 def _steps(facts: Facts) -> list[Step]:
     """The gap at left-out points before and after the effects are added, and the noise."""
     rows = [("calibrated", facts["gap_rms_mm"], "before")]
-    if facts["effects"]:
+    if facts["effects"] or facts["unnamed"]:
         rows.append(("with the effects too", facts["gap_after_rms_mm"], "after"))
     rows.append(("measuring noise", facts["noise_rms_mm"], "noise"))
     longest = max(size for _, size, _ in rows) or 1.0

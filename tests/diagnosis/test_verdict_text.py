@@ -166,6 +166,26 @@ def test_shares_overlap_only_where_there_are_several(shares, unexplained, overla
     assert ("and of what is unexplained cancel" in said) == (overlap and unexplained is not None)
 
 
+@pytest.mark.parametrize(
+    ("effects", "who"),
+    [
+        ("link_flexure+unexplained", "With it and what may act as well (drive compliance) in the simulator"),
+        ("link_flexure+backlash+unexplained", "With them and what may act as well (drive compliance) in the simulator"),
+        ("unexplained", "With what may act as well (drive compliance) in the simulator"),
+    ],
+)
+def test_the_model_says_what_it_has_besides_the_named_causes(effects, who):
+    facts = answered(effects=effects, unnamed="drive_compliance")
+    (said,) = (one for one in facts["sentences"] if one.startswith(who))
+    assert [claim.kind for claim in claims._of_text(said, claims._SENTENCES)] == [
+        "what is left with it",
+        "the measuring noise",
+    ]
+    assert facts["unnamed"] == ["drive_compliance"] and any(
+        "with the effects" in step.words for step in card(facts).steps
+    )
+
+
 def test_confounded_causes_are_one_sentence_with_their_probabilities():
     causes = synthetic_gap.gap_attribute(CAMPAIGN)
     grouped = causes["effect"].isin(["link_flexure", "servo_lag"])

@@ -38,7 +38,14 @@ def gap_verdicts(campaign, effects="link_flexure+backlash", **changes):
         "undecided": "",
         "noise_from": "repeats",
     }
-    texts |= {"notes": "", "not_in_model": "", "no_answer": "", "file_remainder": "", "file_headline": ""}
+    texts |= {
+        "unnamed": "",
+        "notes": "",
+        "not_in_model": "",
+        "no_answer": "",
+        "file_remainder": "",
+        "file_headline": "",
+    }
     texts["where"] = "leg 2 wrist, leg 1 drive to leg 3 drive"
     numbers = {"probability": 0.97, "leg": 2, "noise_rms_mm": NOISE_MM, "gap_rms_mm": 0.37, "gap_after_rms_mm": 0.02}
     numbers |= {"file_error_mm": np.nan, "file_error_fresh_mm": np.nan}

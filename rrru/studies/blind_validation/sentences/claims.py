@@ -16,6 +16,8 @@ _Y = rf"(?P<other>{_NUMBER})"
 # a number with its unit, and its 95 % interval
 _ENDS = r" \(95 %: [^)]*\)"
 _SIZED = rf"{_X}(?: [^\s(]+)?(?P<ends>{_ENDS})"
+# the corrected model: the causes that are named, and others
+_MODEL = r"(?:(?:it|them)(?: and )?)?(?:what may act as well \([^)]*\))?"
 _SHARE = rf"(?P<share>{_NUMBER}) %(?: of the gap)?(?:{_ENDS})?"
 # text about a cause after its share or size
 _CAUSE = (
@@ -60,7 +62,7 @@ _SENTENCES = {
     "it does not repeat": rf"(?:{_SHARE}|An undetermined share|Some of it) does not repeat from pass to pass.*",
     "it is random error": rf"(?:{_SHARE}|An undetermined share|Some of it) is random error above the stated noise.*",
     "it looks random and repeats": rf"(?:{_SHARE}|An undetermined share|Some of it) looks like random error\..*",
-    "what is left with it": rf"With (?:it|them) in the simulator the residual error at left-out points is {_X} mm; "
+    "what is left with it": rf"With {_MODEL} in the simulator the residual error at left-out points is {_X} mm; "
     rf"the noise is {_Y} mm\.",
     "these data cannot rule out": r"(?:These data cannot rule out|Parts of the unexplained share could be): "
     r"(?P<names>.*)\.",
