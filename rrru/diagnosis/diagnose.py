@@ -245,7 +245,8 @@ def _decide(
     The probabilities come from the evidence, and cross-validation has a veto. An effect that predicts left-out points
     worse than the verdict without it, by more than chance, is ruled out, and the others are decided again. Where
     something is unexplained an effect may be a part of that: it has to predict them better, and to make more than a
-    small part of the gap, to be named. One that predicts them better and is too small for a name stays in the model.
+    small part of the gap, to be named. One that is too small for a name stays in the model where left-out points are
+    nearer with it.
     """
     ruled_out: set[str] = set()
     small: frozenset[str] = frozenset()
@@ -259,9 +260,14 @@ def _decide(
         worse = {name for name, gain in _gains(fitted).items() if gain < least}
         if not worse:
             ordered = order_by_share(fitted)
+            shares = {term.effect: share for term, share in ordered}
             # decided once, with all effects fitted: an effect that is left out would be a part of the remainder
-            if not small and (small := _small(fitted, {term.effect: share for term, share in ordered}, verdict)):
-                unnamed = tuple(name for name in verdict.effects if name in small)
+            if not small and (small := _small(fitted, shares, verdict)):
+                unnamed = tuple(name for name in verdict.effects if name in small and shares.get(name, 0.0) > 0.0)
+                continue
+            if any(shares.get(name, 1.0) <= 0.0 for name in unnamed):
+                # a rough function can be probable and move the left-out points away
+                unnamed = tuple(name for name in unnamed if shares.get(name, 0.0) > 0.0)
                 continue
             named = tuple(term.effect for term, _ in ordered if term.effect in verdict.effects)
             return replace(verdict, effects=named), fitted, ordered
