@@ -153,18 +153,19 @@ def _significant_nuisance(inference: InferenceResult) -> Iterator[tuple[str, str
     """Name, unit, value, 95 % interval and whether determined, of each significant error of payload and tilt.
 
     With one load all deflections are in proportion to it: the mass is then only relative to masses of the links, which
-    are not measured.
+    are not measured. Where something is unexplained both may be a part of that.
     """
     fit, problem = inference.fit, inference.problem
     estimate, weight = fit.estimate, fit.weight
-    if not weight or problem.massless:
-        # an error of the payload would be the weight of the links
+    unexplained = inference.posterior.probability_unexplained > OPTIONS.min_unexplained_probability
+    if not weight or problem.massless or unexplained:
+        # without masses an error of the payload would be the weight of the links
         return
     block = estimate.parameters.places[WEIGHT]
     shares, intervals = estimate.prior_shares[block], estimate.intervals[block]
     several_loads = len(np.unique(np.nan_to_num(problem.motion.payload_kg[problem.used]))) > 1
     for (name, unit, value, error), share, interval in zip(weight, shares, intervals, strict=True):
-        if abs(value) > OPTIONS.min_nuisance_z * error:
+        if abs(value) > OPTIONS.min_nuisance_z * error and not interval[0] <= 0.0 <= interval[1]:
             determined = share <= OPTIONS.max_prior_variance_share and (unit != "kg" or several_loads)
             yield name, unit, value, interval, determined
 

@@ -260,6 +260,8 @@ def test_a_zero_that_moves_is_that_drives_whatever_else_changes_with_time(law, j
     if law == "slip":
         assert set(found.verdict["effects"].split("+")) <= {"zero_drift", "unexplained"}
         assert found.tables["gap_remainder"]["follows"].iloc[0] == f"the time, in the zero of joint {joint}"
+        # no effect is in the model that moves left-out points away
+        assert found.verdict["gap_after_rms_mm"] <= found.verdict["gap_rms_mm"]
         return
     assert found.verdict["effects"] == "zero_drift" and found.verdict["leg"] == joint
     numbers = found.tables["gap_parameters"].query("effect == 'zero_drift'").set_index("parameter")

@@ -123,8 +123,11 @@ def test_a_zero_confounded_with_a_link_is_said_to_be_most_probable_only():
     assert "zero is not determined by the readings, its most probable offset is 11.5 degrees (95 %: 9.2" in note
 
 
-def _weighed(passes, stated_kg):
-    """Errors of payload and tilt, and both kinds of notes, of a soft robot with a stated mass of its platform."""
+def _weighed(passes, stated_kg, unexplained=0.0):
+    """Errors of payload and tilt, and both kinds of notes, of a soft robot with a stated mass of its platform.
+
+    unexplained: probability that something is.
+    """
     name = "drive_compliance"
     library = {name: campaigns.EFFECTS[name]}
     frame = campaigns.measure((campaigns.strong(name, 30.0),), plan=campaigns.plan_of(passes))
@@ -132,7 +135,8 @@ def _weighed(passes, stated_kg):
     problem = make_diagnosis_problem(frame, campaigns.MODEL, masses, campaigns.NOISE_MM, library)
     sizes = 20.0 * np.asarray(library[name].coordinates.typical)
     fit = fit_model(problem, [calibrate(problem)], [EffectTerm(name)], sizes)
-    found = SimpleNamespace(problem=problem, fit=fit)
+    posterior = SimpleNamespace(probability_unexplained=unexplained)
+    found = SimpleNamespace(problem=problem, fit=fit, posterior=posterior)
     return fit.weight, list(payload_notes(found)), list(undetermined_payload_notes(found))
 
 
@@ -149,6 +153,11 @@ def test_a_mass_that_is_not_stated_is_said_where_two_loads_were_driven():
     _, (note,), undetermined = _weighed((campaigns.FORWARD, campaigns.LOADED), 0.5 * _PLATFORM_KG)
     low, high = map(float, re.search(r"\(95 %: (\S+) to (\S+)\) more than stated", note).groups())
     assert low < 0.5 * _PLATFORM_KG < high < 1.2 * low and not undetermined
+
+
+def test_a_mass_beside_something_unexplained_may_be_a_part_of_that():
+    weight, notes, undetermined = _weighed((campaigns.FORWARD, campaigns.LOADED), 0.5 * _PLATFORM_KG, 0.9)
+    assert weight and not notes and not undetermined
 
 
 def test_a_mass_that_ends_at_its_bound_is_said():
