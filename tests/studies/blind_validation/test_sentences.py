@@ -6,6 +6,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from rrru.studies.blind_validation.sentences import claims, judge
+from rrru.studies.blind_validation.sentences import claims as claims_module
 from rrru.studies.blind_validation.sentences.claims import UNKNOWN, Claim
 from rrru.studies.blind_validation.sentences.truth import Truth
 
@@ -465,3 +466,10 @@ def test_a_mistake_is_judged_by_the_words_that_it_gets(tmp_path):
     own, right = mistakes.right_file(0, 5, 70)
     assert not mistakes.shows("sign of a drive", own, right)
     assert mistakes.read(own, right, tmp_path)[0] == "accepted"
+
+
+def test_a_unit_in_brackets_is_part_of_a_size():
+    sizes = "compliance2 = 25.09 µrad/(N m) (95 %: 24.61 to 25.57), compliance3 = 18.38 µrad/(N m) (95 %: 17.6 to 19.1)"
+    said = f"98 % of the gap (95 %: 96 % to 100 %) is drive compliance, {sizes}: the drive deflects under its torque."
+    found = {claim.kind: claim for claim in claims_module._of_text(said, claims_module._SENTENCES)}
+    assert found["a cause with a share"].stated["name"] == "drive compliance" and UNKNOWN not in found
