@@ -128,7 +128,7 @@ def _variables(problem: DiagnosisProblem, rows: BoolArray) -> list[_Variable]:
     ]
     time_s = motion.time_s[at][:, None]
     found += [
-        _Variable(f"{_TIME}, in the zero of {name}", time_s, "s", k) for k, name in enumerate(names[: len(units)])
+        _Variable(f"{_TIME}, as a zero offset of {name}", time_s, "s", k) for k, name in enumerate(names[: len(units)])
     ]
     found.append(_Variable("the place", motion.position_mm[at], "mm"))
     found.append(_Variable(_TIME, time_s, "s"))

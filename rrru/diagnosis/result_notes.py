@@ -126,7 +126,7 @@ def mass_notes(problem: DiagnosisProblem) -> Iterator[str]:
 
 
 def mounting_notes(inference: InferenceResult) -> Iterator[str]:
-    """The sentence that the direction of gravity is assumed, where a named effect depends on it."""
+    """The sentence that the direction of gravity is assumed, where an effect of the model depends on it."""
     effects = inference.problem.effects
     if not inference.problem.mechanism.up_stated and any(
         is_compliance(effects[name]) for name, _ in inference.state.effects if name in effects

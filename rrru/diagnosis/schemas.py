@@ -18,8 +18,8 @@ values are of 3-D distances.
 campaign
 effects                str    names joined by + in the order of their share; none; unexplained where the library does
     not hold it
-unnamed                str    names joined by + of effects that the corrected model has as well: they predict left-out
-    points better, but may be a part of what is unexplained; empty where there are none
+unnamed                str    names joined by + of possible effects that the corrected model has as well: left-out
+    points are nearer with them, but they may be a part of the unexplained error; empty where there are none
 probability            float  that exactly these effects act, or that these and something unexplained do, 0 to 1; 1
     where there is no answer. gap_attribute has that of each effect
 leg                    int    the one leg or drive at fault, from 1 on; 0 for all or none
@@ -145,8 +145,8 @@ What the unexplained part of a gap looks like: how well a function of one variab
 unexplained.
 --
 campaign
-follows                str    the variable: the value of a drive, the place, the time, also in the zero of a drive, the
-    payload, the speed, the sense of motion of the drives
+follows                str    the variable: the value of a drive, the place, the time, also as a zero offset of a drive,
+    the payload, the speed, the sense of motion of the drives
 explained              float  share of its mean square that such a function predicts at left-out points, 0 to 1
 scale                  float? distance over which the function changes; null for steps
 unit                   str    of the variable

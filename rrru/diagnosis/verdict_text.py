@@ -453,11 +453,9 @@ def _scatter_parts(facts: Facts, least: float = 0.0) -> list[Facts]:
 def _left(facts: Facts) -> list[str]:
     """Residual error with the effects in the simulator."""
     after, noise = (rounded(facts[name]) for name in ("gap_after_rms_mm", "noise_rms_mm"))
-    parts = [] if not facts["effects"] else ["it"] if len(facts["effects"]) == 1 else ["them"]
-    if facts["unnamed"]:
-        # causes that may act, of which each predicts left-out points better
-        parts.append(f"what may act as well ({', '.join(map(readable, facts['unnamed']))})")
-    what = " and ".join(parts)
+    named = {0: "", 1: "it"}.get(len(facts["effects"]), "them")
+    further = f"possible further causes ({', '.join(map(readable, facts['unnamed']))})" if facts["unnamed"] else ""
+    what = " and ".join(filter(None, (named, further)))
     size = f"{after} mm; the noise is {noise} mm"
     return [f"With {what} in the simulator the residual error at left-out points is {size}."]
 

@@ -5,12 +5,11 @@ Step, acceptance, convergence and covariance come from the same penalised, white
     F(x) = 1/2 sum rho(r_i^2) + 1/2 sum ((x_j - m_j) / s_j)^2,    r = W (y - h(x))
 
 The steps are Levenberg's and Marquardt's, in units of the priors' standard deviations. A damped step keeps combinations
-that the readings do not determine near the prior mean. A step that gains less than half of what was predicted is bent
-as the readings bend (the second-order correction along the step: Transtrum and Sethna, Improvements to the
-Levenberg-Marquardt algorithm, arXiv:1201.5885, 2012) and, if need be, cut where a parabola through the objective is
-least: so a search follows the curved valley of two factors of one product, such as a compliance and a load. Parameters
-at a bound that the gradient presses against are held (Kanzow, Yamashita and Fukushima, Journal of Computational and
-Applied Mathematics 172, 2004).
+that the readings do not determine near the prior mean. A step that gains less than half of the prediction gets a
+second-order correction (geodesic acceleration: Transtrum and Sethna, Improvements to the Levenberg-Marquardt algorithm,
+arXiv:1201.5885, 2012) and, if need be, a step length by quadratic interpolation: so a search follows the curved valley
+of two factors of one product, such as a compliance and a load. Parameters at a bound that the gradient presses against
+are held (Kanzow, Yamashita and Fukushima, Journal of Computational and Applied Mathematics 172, 2004).
 """
 
 from collections.abc import Callable, Iterable
@@ -51,9 +50,9 @@ class SolverOptions:
 _LEAST_DAMPING = 1e-13
 # damping, times two, after the first step that does not lower the objective
 _RETRY_DAMPING = 1e-3
-# the damping falls by this after a step that gains at least this share of the prediction
-_FALL, _WELL_PREDICTED = 0.1, 0.5
-# a step is not cut to less than this share
+# the damping decreases by this factor after a step that gains at least this share of the prediction
+_DAMPING_DECREASE, _WELL_PREDICTED = 0.1, 0.5
+# least step length, as a share of the step
 _SHORTEST = 0.05
 _Function = Callable[[FloatArray], FloatArray]
 # rho(z) and its derivative by z, the squared residual in units of the loss scale (as scipy names them)
@@ -161,7 +160,7 @@ class _Search:
                 return
             while True:
                 step = linearized.step(damping)
-                trial = self._tried(step, free, white)
+                trial = self._best_trial(step, free, white)
                 if trial.cost < self.cost:
                     break
                 if step.gain <= max(least, options.rounding * self.cost):
@@ -172,13 +171,13 @@ class _Search:
                     self.message = "no step lowers the objective"
                     return
             if self.cost - trial.cost >= _WELL_PREDICTED * step.gain:
-                damping *= _FALL
+                damping *= _DAMPING_DECREASE
             growth = 2.0
             self.values, self.residual, self.cost = trial.values, trial.residual, trial.cost
 
-    def _tried(self, step: "_Step", free: IntArray, white: FloatArray) -> "_Trial":
-        """The best _Trial of a step of the free parameters (k,): the step itself where it gains what is predicted, or
-        nearly so, else also the bent one, and else the cut one. white (n a, p + 1): of `_linearized`.
+    def _best_trial(self, step: "_Step", free: IntArray, white: FloatArray) -> "_Trial":
+        """The best _Trial of a step of the free parameters (k,): of the step itself and, where it gains too little,
+        with the second-order correction and with the interpolated length. white (n a, p + 1): of `_linearized`.
         """
         trial = self._along(step.change, free)
         gained, wanted = self.cost - trial.cost, _WELL_PREDICTED * step.gain
@@ -187,8 +186,8 @@ class _Search:
         self.straight = False
         if self._problem.loss == "linear":
             beyond = trial.residual.ravel() - white[:, -1] - white[:, free] @ step.change
-            bent = self._along(step.change + step.correction(white[:, free].T @ beyond), free)
-            trial = min(trial, bent, key=lambda one: one.cost)
+            corrected = self._along(step.change + step.correction(white[:, free].T @ beyond), free)
+            trial = min(trial, corrected, key=lambda one: one.cost)
             if self.cost - trial.cost >= wanted:
                 return trial
         # where the parabola through both ends, with the slope at the first, is least
@@ -246,7 +245,7 @@ class _Step:
     triangle: FloatArray
 
     def correction(self, pull: FloatArray) -> FloatArray:
-        """Change (k,) that answers readings beyond the linear model by a pull J^T d (k,)."""
+        """Second-order correction (k,) for a residual d beyond the linear model; pull (k,): J^T d."""
         result = np.zeros(len(self.change))
         if not self.inside.any():
             return result

@@ -31,8 +31,8 @@ Facts: TypeAlias = Mapping[str, Any]
 _LEAST_MM = 0.001
 # said next to a corrected file where the instrument's frame was fitted to the commanded points
 _REGISTERED = (
-    "Its positions are in the robot's frame: readings of the instrument have to be turned into it by the table "
-    "registration before they are compared."
+    "Its positions are in the robot's frame: transform readings of the instrument by the table registration before "
+    "you compare them."
 )
 
 

@@ -259,7 +259,7 @@ def test_a_zero_that_moves_is_that_drives_whatever_else_changes_with_time(law, j
     found = diagnose(frame, MeasuredRobot(arms.reading(frame), arms.MASSES, 0.02), GapSettings(draws=20))
     if law == "slip":
         assert set(found.verdict["effects"].split("+")) <= {"zero_drift", "unexplained"}
-        assert found.tables["gap_remainder"]["follows"].iloc[0] == f"the time, in the zero of joint {joint}"
+        assert found.tables["gap_remainder"]["follows"].iloc[0] == f"the time, as a zero offset of joint {joint}"
         # no effect is in the model that moves left-out points away
         assert found.verdict["gap_after_rms_mm"] <= found.verdict["gap_rms_mm"]
         return

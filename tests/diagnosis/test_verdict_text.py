@@ -116,7 +116,7 @@ def test_the_error_to_expect_of_a_corrected_file_holds_what_the_diagnosis_leaves
     assert "0.030 mm at held-out points. With it 0.050 mm are to be expected" in " ".join(card(facts).worth)
     # the file does not know where the instrument stood
     registered = card(facts, found=Worth(100, 0.3, 0.1, True)).worth
-    assert any("turned into it by the table registration" in said for said in registered)
+    assert any("by the table registration" in said for said in registered)
     assert not any("registration" in said for said in card(facts, found=Worth(100, 0.3, 0.1, False)).worth)
 
 
@@ -169,9 +169,12 @@ def test_shares_overlap_only_where_there_are_several(shares, unexplained, overla
 @pytest.mark.parametrize(
     ("effects", "who"),
     [
-        ("link_flexure+unexplained", "With it and what may act as well (drive compliance) in the simulator"),
-        ("link_flexure+backlash+unexplained", "With them and what may act as well (drive compliance) in the simulator"),
-        ("unexplained", "With what may act as well (drive compliance) in the simulator"),
+        ("link_flexure+unexplained", "With it and possible further causes (drive compliance) in the simulator"),
+        (
+            "link_flexure+backlash+unexplained",
+            "With them and possible further causes (drive compliance) in the simulator",
+        ),
+        ("unexplained", "With possible further causes (drive compliance) in the simulator"),
     ],
 )
 def test_the_model_says_what_it_has_besides_the_named_causes(effects, who):

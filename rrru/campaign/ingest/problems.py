@@ -53,10 +53,18 @@ class Problems:
                 listed.append(problems[0] | {"row": None, "column": None, "value": more})
         return listed
 
-    def refuse_now(self, *, value: str, allowed: str, row: int | None = None, column: str | None = None) -> NoReturn:
-        """Raise IngestError for a problem that leaves nothing more to look at."""
+    def refuse_now(
+        self,
+        *,
+        value: str,
+        allowed: str,
+        row: int | None = None,
+        column: str | None = None,
+        error: type[IngestError] = IngestError,
+    ) -> NoReturn:
+        """Raise an IngestError, of a class, for a problem that leaves nothing more to look at."""
         self.add("file", row=row, column=column, value=value, allowed=allowed)
-        raise IngestError(self._listed())
+        raise error(self._listed())
 
 
 def _short(text: str) -> str:

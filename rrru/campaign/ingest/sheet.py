@@ -9,6 +9,7 @@ import pandas as pd
 
 from rrru.campaign import measurements as rows
 from rrru.campaign.ingest.problems import Problems
+from rrru.errors import IngestError
 from rrru.kinematics.chain import Poses
 from rrru.kinematics.robot import Robot
 
@@ -79,9 +80,11 @@ class Sheet:
         """Note a problem in columns of ours, one name or several, or None."""
         self.problems.add(kind, row=row, column=self._column(ours), value=value, allowed=allowed)
 
-    def refuse_now(self, ours: str | Sequence[str] | None, value: str, allowed: str) -> NoReturn:
-        """Raise IngestError for a problem in columns of ours that leaves nothing more to look at."""
-        self.problems.refuse_now(column=self._column(ours), value=value, allowed=allowed)
+    def refuse_now(
+        self, ours: str | Sequence[str] | None, value: str, allowed: str, error: type[IngestError] = IngestError
+    ) -> NoReturn:
+        """Raise an IngestError, of a class, for a problem in columns of ours that leaves nothing more to look at."""
+        self.problems.refuse_now(column=self._column(ours), value=value, allowed=allowed, error=error)
 
     def _column(self, ours: str | Sequence[str] | None) -> str | None:
         """The file's names of columns of ours."""

@@ -17,7 +17,7 @@ _Y = rf"(?P<other>{_NUMBER})"
 _ENDS = r" \(95 %: [^)]*\)"
 _SIZED = rf"{_X}(?: [^\s(]+)?(?P<ends>{_ENDS})"
 # the corrected model: the causes that are named, and others
-_MODEL = r"(?:(?:it|them)(?: and )?)?(?:what may act as well \([^)]*\))?"
+_MODEL = r"(?:(?:it|them)(?: and )?)?(?:possible further causes \([^)]*\))?"
 _SHARE = rf"(?P<share>{_NUMBER}) %(?: of the gap)?(?:{_ENDS})?"
 # text about a cause after its share or size
 _CAUSE = (
