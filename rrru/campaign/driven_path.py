@@ -1,5 +1,6 @@
 """The path behind a measurement table, as far as its columns determine it. Lengths in mm, times in s."""
 
+from collections.abc import Iterator
 from itertools import pairwise
 from typing import TypeAlias
 
@@ -25,6 +26,8 @@ Course: TypeAlias = dict[str, np.ndarray]
 _CORNER, _STRAIGHT = 0.2, 0.02
 # an interval at a run's end or a corner that is this much slower than the next leads to rest
 _SLOWER = 0.9
+# decimals of the shares of a run's way, far below what a drive resolves
+_DIGITS_OF_SHARES = 12
 # ASSUME a robot that rests at each reading and moves by less than this, in mm and rad, has not moved: its drive values
 # are read back at each reading, with some noise
 _STILL_MM, _STILL_RAD = 0.05, 5e-4
@@ -33,8 +36,15 @@ _STILL_MM, _STILL_RAD = 0.05, 5e-4
 def driven_path(measurements: pd.DataFrame, degree: int = DEGREE) -> tuple[np.ndarray, Course]:
     """`_path_through` the rows of a measurement table; several reflectors measured at one pose are one stop."""
     stop = stops(measurements)
-    path, course = _path_through(measurements[_first_rows(stop)], degree)
+    at_stops = measurements[_first_rows(stop)]
+    path, index = _path_through(at_stops, degree)
+    course = _commanded(at_stops) | {"path_index": index}
     return path, {name: values[stop] for name, values in course.items()}
+
+
+def path_through(measurements: pd.DataFrame, degree: int = DEGREE) -> np.ndarray:
+    """The path (N, 3) of `driven_path` alone."""
+    return _path_through(measurements[_first_rows(stops(measurements))], degree)[0]
 
 
 def drive_rates(measurements: pd.DataFrame, actuators: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -63,8 +73,8 @@ def smooth_drives(
     # a tool that only turns has no way, but its drives have one
     turned = _chords(drives / np.where(span > 0.0, span, 1.0))
     way = np.maximum(_chords(tool), _DRIVES_WAY * reach * turned)
-    for piece in _runs(run):
-        smooth, _ = _through(drives[piece], way[piece.start : piece.stop - 1], _corners(tool[piece]), degree)
+    pieces = _runs(run)
+    for piece, smooth in zip(pieces, _through_runs(drives, way, pieces, _corners(tool, run), degree), strict=True):
         result[index[piece][0] : index[piece][-1] + 1] = smooth
     return result
 
@@ -89,27 +99,33 @@ def _first_rows(stop: np.ndarray) -> np.ndarray:
     return np.diff(stop, prepend=-1) > 0
 
 
-def _path_through(measurements: pd.DataFrame, degree: int) -> tuple[np.ndarray, Course]:
-    """The path (N, 3) of everything that is driven, transfers included, and what the robot was commanded to do on it.
+def _path_through(measurements: pd.DataFrame, degree: int) -> tuple[np.ndarray, np.ndarray]:
+    """The path (N, 3) of everything that is driven, transfers included, and its rows (n,) at those of the table.
 
-    degree: odd, of the splines through a run's points. The commanded course is by name, of the n rows of a measurement
-    table in the order driven: position_mm, velocity_mm_s, acceleration_mm_s2 (n, 3), time_s, payload_kg, temperature_c
-    and path_index, their rows of the path (n,); NaN where unknown.
+    degree: odd, of the splines through a run's points.
 
-    # ASSUME the robot passes smoothly through a run's commanded points, except at corners between straight parts. It
-    rests where it slows down towards an end or a corner. Speeds and accelerations come from the times; where a run has
-    no increasing times, or its points follow no path, they are NaN.
+    # ASSUME the robot passes smoothly through a run's commanded points, except at corners between straight parts.
     """
     position, run = rows.command(measurements), measurements["run"].to_numpy()
+    pieces, way = _runs(run), _chords(position)
+    smooth = _through_runs(position, way, pieces, _corners(position, run), degree)
+    return connect(smooth, [np.arange(piece.stop - piece.start) * STEPS for piece in pieces], _TRANSFER_STEPS)
+
+
+def _commanded(measurements: pd.DataFrame) -> Course:
+    """What the robot was commanded to do at the n rows of a measurement table in the order driven.
+
+    By name: position_mm, velocity_mm_s, acceleration_mm_s2 (n, 3), time_s, payload_kg, temperature_c; NaN where
+    unknown.
+
+    # ASSUME the robot rests where it slows down towards an end or a corner. Speeds and accelerations come from the
+    times; where a run has no increasing times, or its points follow no path, they are NaN.
+    """
+    position = rows.command(measurements)
     named = measurements.reindex(columns=("time_s", "payload_kg", "temperature_c"))
     course = {name: named[name].to_numpy(dtype=float) for name in named}
-    pieces = _runs(run)
     velocity, acceleration = rates(measurements, position)
-    parts = [position[piece] for piece in pieces]
-    smooth = [_through(part, _chords(part), _corners(part), degree) for part in parts]
-    path, index = connect([points for points, _ in smooth], [at for _, at in smooth], _TRANSFER_STEPS)
-    course |= {"position_mm": position, "velocity_mm_s": velocity, "acceleration_mm_s2": acceleration}
-    return path, course | {"path_index": index}
+    return course | {"position_mm": position, "velocity_mm_s": velocity, "acceleration_mm_s2": acceleration}
 
 
 def rates(measurements: pd.DataFrame, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -124,9 +140,15 @@ def rates(measurements: pd.DataFrame, values: np.ndarray) -> tuple[np.ndarray, n
         return np.zeros_like(values), np.zeros_like(values)
     if not passes_points(measurements):
         return np.full_like(values, np.nan), np.full_like(values, np.nan)
-    derivatives = [_run_rates(values[piece], time[piece], _corners(position[piece])) for piece in _runs(run)]
-    first, second = zip(*derivatives, strict=True)
-    return np.concatenate(first), np.concatenate(second)
+    corners = _corners(position, run)
+    result = np.full((2, *values.shape), np.nan)
+    parts = [part for piece in _runs(run) for part in _parts(piece, corners)]
+    for times, index in _alike(parts, [time[part] for part in parts]):
+        before, after = result[:, index], np.array(_derivatives(values[index], times))
+        # at a corner, where two parts meet, the mean of both sides
+        mean = np.where(np.isnan(after), before, 0.5 * (before + after))
+        result[:, index] = np.where(np.isnan(before), after, mean)
+    return result[0], result[1]
 
 
 def passes_points(measurements: pd.DataFrame) -> bool:
@@ -156,51 +178,67 @@ def starts_of_runs(run: np.ndarray) -> np.ndarray:
     return np.concatenate([[True], np.diff(run) != 0])
 
 
-def _corners(position_mm: np.ndarray) -> np.ndarray:
-    """Points (c,) of the path (k, 3) of one run at which it has a corner, after its first and before its last point.
+def _corners(position_mm: np.ndarray, run: np.ndarray) -> np.ndarray:
+    """Rows (c,) of a path (n, 3) in runs (n,) at which it has a corner, after a run's first and before its last row.
 
     # ASSUME a path that is straight at three points is straight between them, and a bend next to it is a corner. One
     smooth curve through both would oscillate about the straight part, and drives that hold there would turn back.
     """
-    moved = np.flatnonzero(np.concatenate([[True], _chords(position_mm) > 0.0]))
-    step = np.diff(position_mm[moved], axis=0)
-    if len(step) < 3:
+    moved = np.flatnonzero(starts_of_runs(run) | np.concatenate([[True], _chords(position_mm) > 0.0]))
+    if len(moved) < 4:
         return np.zeros(0, dtype=int)
-    step /= np.linalg.norm(step, axis=1)[:, None]
-    bend = 2.0 * np.arcsin(np.clip(0.5 * np.linalg.norm(np.diff(step, axis=0), axis=1), 0.0, 1.0))
-    # the bend beyond an end is unknown
-    next_to_straight = (np.array([np.inf, *bend[:-1]]) < _STRAIGHT) | (np.array([*bend[1:], np.inf]) < _STRAIGHT)
-    return np.asarray(moved[1:-1][(bend > _CORNER) & next_to_straight])
+    run = run[moved]
+    step, same = np.diff(position_mm[moved], axis=0), run[1:] == run[:-1]
+    step /= np.maximum(_lengths(step), 1e-300)[:, None]
+    bend = 2.0 * np.arcsin(np.clip(0.5 * _lengths(np.diff(step, axis=0)), 0.0, 1.0))
+    # at a run's ends, and beyond them, the bend is unknown
+    within = np.concatenate([[False], same[:-1] & same[1:], [False]])
+    bend = np.where(within, np.concatenate([[np.inf], bend, [np.inf]]), np.inf)
+    straight = np.concatenate([[False], bend < _STRAIGHT, [False]])
+    return np.asarray(moved[within & (bend > _CORNER) & (straight[:-2] | straight[2:])])
 
 
-def _run_rates(values: np.ndarray, time: np.ndarray, corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """`_derivatives` of values (k, j) of one run at times (k,); at corners (c,) the mean of those of both sides."""
-    result = np.full((2, *values.shape), np.nan)
-    for first, last in pairwise([0, *corners, len(values) - 1]):
-        piece = slice(first, last + 1)
-        before, after = result[:, piece].copy(), np.array(_derivatives(values[piece], time[piece]))
-        mean = np.where(np.isnan(after), before, 0.5 * (before + after))
-        result[:, piece] = np.where(np.isnan(before), after, mean)
-    return tuple(result)
+def _parts(piece: slice, corners: np.ndarray) -> list[slice]:
+    """Slices of a run's rows from corner to corner (c,); two that meet at a corner both have its row."""
+    first, last = np.searchsorted(corners, (piece.start, piece.stop))
+    return [slice(a, b + 1) for a, b in pairwise([piece.start, *corners[first:last].tolist(), piece.stop - 1])]
+
+
+def _alike(parts: list[slice], keys: list[np.ndarray]) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Each different key (k,) and the rows (r, k) of the parts that have it: one spline serves all of them."""
+    groups: dict[bytes, tuple[np.ndarray, list[np.ndarray]]] = {}
+    for part, key in zip(parts, keys, strict=True):
+        groups.setdefault(key.tobytes(), (key, []))[1].append(np.arange(part.start, part.stop))
+    for key, index in groups.values():
+        yield key, np.stack(index)
 
 
 def _derivatives(points: np.ndarray, time: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """First and second derivative (k, j) along the points (k, j) of a run or a part of it.
+    """First and second derivative (r, k, j) along the points (r, k, j) of r runs, or parts of them, at times (k,).
 
     NaN without increasing times. An end is one of rest where the robot slows down towards it; else the recording
     stopped or began on the way.
     """
     from scipy.interpolate import CubicSpline
 
-    nothing = np.full_like(points, np.nan)
-    if len(points) < 3 or not np.isfinite(time).all() or not (np.diff(time) > 0.0).all():
-        return nothing, nothing
-    speed = np.linalg.norm(np.diff(points, axis=0), axis=1) / np.diff(time)
-    at_rest = (speed[0] < _SLOWER * speed[1], speed[-1] < _SLOWER * speed[-2])
-    spline = CubicSpline(time, points, bc_type=tuple("clamped" if still else "not-a-knot" for still in at_rest))
-    acceleration = spline(time, 2)
-    acceleration[[end for end, still in zip((0, -1), at_rest, strict=True) if still]] = 0.0
-    return spline(time, 1), acceleration
+    first, second = np.full_like(points, np.nan), np.full_like(points, np.nan)
+    if len(time) < 3 or not np.isfinite(time).all() or not (np.diff(time) > 0.0).all():
+        return first, second
+    speed = _lengths(np.diff(points, axis=1)) / np.diff(time)
+    at_rest = np.stack([speed[:, 0] < _SLOWER * speed[:, 1], speed[:, -1] < _SLOWER * speed[:, -2]], axis=1)
+    for ends in np.unique(at_rest, axis=0):
+        alike = (at_rest == ends).all(axis=1)
+        kinds = tuple("clamped" if still else "not-a-knot" for still in ends)
+        spline = CubicSpline(time, points[alike], axis=1, bc_type=kinds)
+        first[alike], acceleration = spline(time, 1), spline(time, 2)
+        acceleration[:, [end for end, still in zip((0, -1), ends, strict=True) if still]] = 0.0
+        second[alike] = acceleration
+    return first, second
+
+
+def _lengths(vectors: np.ndarray) -> np.ndarray:
+    """Lengths (..) of vectors (.., j)."""
+    return np.asarray(np.sqrt(np.einsum("...j,...j->...", vectors, vectors)))
 
 
 def _chords(points: np.ndarray) -> np.ndarray:
@@ -208,29 +246,45 @@ def _chords(points: np.ndarray) -> np.ndarray:
     return np.asarray(np.linalg.norm(np.diff(points, axis=0), axis=1))
 
 
-def _through(points: np.ndarray, way: np.ndarray, corners: np.ndarray, degree: int) -> tuple[np.ndarray, np.ndarray]:
-    """Points (N, j) of a path through the points (k, j) of one run, smooth from corner to corner (c,) of them, and the
-    rows (k,) of these in it.
+def _through_runs(
+    points: np.ndarray, way: np.ndarray, pieces: list[slice], corners: np.ndarray, degree: int
+) -> list[np.ndarray]:
+    """Paths (N, j) through points (n, j) of each run, smooth from corner to corner (c,).
 
-    way (k - 1,): how far it is from each to the next.
+    way (n - 1,): how far it is from each to the next.
     """
-    parts = [_smooth(points[a : b + 1], way[a:b], degree) for a, b in pairwise([0, *corners, len(points) - 1])]
-    path = np.concatenate([parts[0], *(part[1:] for part in parts[1:])])
-    return path, np.arange(len(points)) * STEPS
+    of_runs = [_parts(piece, corners) for piece in pieces]
+    parts = [part for of_run in of_runs for part in of_run]
+    smooth: dict[int, np.ndarray] = {}
+    for shares, index in _alike(parts, [_shares(way[part.start : part.stop - 1]) for part in parts]):
+        smooth |= zip(index[:, 0].tolist(), _smooth(points[index], shares, degree), strict=True)
+    # the row of a corner is the last of one part and the first of the next
+    return [
+        np.concatenate([smooth[first.start], *(smooth[part.start][1:] for part in more)]) for first, *more in of_runs
+    ]
 
 
-def _smooth(points: np.ndarray, way: np.ndarray, degree: int) -> np.ndarray:
-    """Points (N, j) of a smooth path through points (k, j), way (k - 1,) apart."""
+def _shares(way: np.ndarray) -> np.ndarray:
+    """Shares (k,) of the whole way at k points, way (k - 1,) apart.
+
+    They are rounded, so that passes of equal steps have equal shares.
+    """
+    # points of no distance still follow one another
+    length = np.concatenate([[0.0], np.cumsum(np.maximum(way, 1e-6 * max(way.max(initial=0.0), 1e-6)))])
+    return np.asarray(np.round(length / max(length[-1], 1e-300), _DIGITS_OF_SHARES))
+
+
+def _smooth(points: np.ndarray, shares: np.ndarray, degree: int) -> np.ndarray:
+    """Points (r, N, j) of smooth paths through points (r, k, j) at shares (k,) of their ways."""
     from scipy.interpolate import make_interp_spline
 
-    at = np.arange(len(points)) * STEPS
-    if len(points) == 1:
+    count = len(shares)
+    at = np.arange(count) * STEPS
+    if count == 1:
         return points
-    # points of no distance still follow one another
-    length = np.concatenate([[0.0], np.cumsum(np.maximum(way, 1e-6 * max(way.max(), 1e-6)))])
-    fine = np.interp(np.arange(at[-1] + 1), at, length)
-    if len(points) == 2:
-        return np.asarray(points[0] + (fine / length[-1])[:, None] * (points[1] - points[0]))
-    path = make_interp_spline(length, points, k=min(degree, len(points) - 1 - len(points) % 2))(fine)
-    path[at] = points
+    fine = np.interp(np.arange(at[-1] + 1), at, shares)
+    if count == 2:
+        return np.asarray(points[:, :1] + fine[:, None] * (points[:, 1:] - points[:, :1]))
+    path = make_interp_spline(shares, points, k=min(degree, count - 1 - count % 2), axis=1)(fine)
+    path[:, at] = points
     return np.asarray(path)

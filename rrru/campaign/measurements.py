@@ -20,7 +20,8 @@ ON_PLATFORM, ON_WORLD = "platform", "world"
 
 def vectors(frame: pd.DataFrame, name: str) -> np.ndarray:
     """Positions (n, 3) in mm that a table holds in the columns name_x_mm, name_y_mm and name_z_mm."""
-    return np.asarray(frame[[f"{name}_{axis}_mm" for axis in "xyz"]].to_numpy(dtype=float))
+    # column by column: a selection of several costs far more than their values
+    return np.stack([frame[f"{name}_{axis}_mm"].to_numpy(dtype=float) for axis in "xyz"], axis=1)
 
 
 def vector_columns(name: str, values: np.ndarray) -> dict[str, np.ndarray]:

@@ -38,9 +38,12 @@ def repeat_noise(measurements: pd.DataFrame) -> tuple[float, int]:
     axes, places = ([f"{name}_{axis}_mm" for axis in "xyz"] for name in ("measured", "command"))
     pose = [name for name in frame if name == "target" or name.startswith("command_r")]
     keys = ["trajectory", "direction", *places, *pose, "speed_mm_s", "payload_kg"]
-    groups = frame.groupby(keys, dropna=False, sort=False)[axes]
-    deviation = (frame[axes] - groups.transform("mean")).to_numpy()
-    freedom = 3 * int(len(frame) - groups.ngroups)
+    codes = np.stack([pd.factorize(frame[key], use_na_sentinel=False)[0] for key in keys], axis=1)
+    _, group, count = np.unique(codes, axis=0, return_inverse=True, return_counts=True)
+    group, measured = group.reshape(-1), np.stack([frame[axis].to_numpy() for axis in axes], axis=1)
+    sums = np.stack([np.bincount(group, axis, len(count)) for axis in measured.T], axis=1)
+    deviation = measured - (sums / count[:, None])[group]
+    freedom = 3 * int(len(frame) - len(count))
     return (float(np.sqrt((deviation**2).sum() / freedom)) if freedom else np.nan), freedom
 
 

@@ -7,6 +7,7 @@ is "unexplained".
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TypeAlias
 
 import numpy as np
@@ -40,7 +41,7 @@ class Unknown:
     along_drives = with_waves = None
     switches = False
 
-    @property
+    @cached_property
     def coordinates(self) -> Coordinates:
         """One coefficient per function and drive or axis, in the drive's unit or mm."""
         legs = np.zeros((self.drives if self.per_leg else 3) * self.count, dtype=int)

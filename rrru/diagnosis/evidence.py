@@ -119,17 +119,23 @@ class ModelEvidence:
         """The columns, whitened."""
         return Whitened(self.library, self.linear, self.run, self.noise)
 
-    @property
-    def levels(self) -> IntArray:
-        """Levels (l,), as indices, that there may be."""
-        return np.arange(len(DISCREPANCY_SCALES)) if self.smooth else np.zeros(1, dtype=int)
-
     @cached_property
+    def levels(self) -> IntArray:
+        """Levels (l,), as indices, that matter: those at which some effects may have more than a negligible weight."""
+        return np.flatnonzero(self._at_levels[:, 1] >= self.none.max() - OPTIONS.negligible_nats)
+
+    @property
     def none(self) -> FloatArray:
         """Log evidence (levels,) of no effect at all, -inf at levels that there cannot be."""
-        return np.array(
-            [self._whitened.gram(k)[2] if k in self.levels else -np.inf for k in range(len(DISCREPANCY_SCALES))]
-        )
+        return self._at_levels[:, 0]
+
+    @cached_property
+    def _at_levels(self) -> FloatArray:
+        """`Whitened.none` (levels, 2), -inf at levels that there cannot be."""
+        result = np.full((len(DISCREPANCY_SCALES), 2), -np.inf)
+        for level in range(len(result) if self.smooth else 1):
+            result[level] = self._whitened.none(level)
+        return result
 
     @cached_property
     def _priors(self) -> dict[EffectTerm | str, Prior]:
@@ -223,7 +229,7 @@ class ModelEvidence:
     def _grams(self, levels: Sequence[int] | IntArray, index: IntArray) -> tuple[FloatArray, FloatArray]:
         """Gram matrices (l, k, k) and moments (l, k) of some columns at levels (indices)."""
         grams = [self._whitened.gram(level) for level in levels]
-        chosen = [(gram.take(index, 0).take(index, 1), moment[index]) for gram, moment, _ in grams]
+        chosen = [(gram.take(index, 0).take(index, 1), moment[index]) for gram, moment in grams]
         return np.array([gram for gram, _ in chosen]), np.array([moment for _, moment in chosen])
 
     def _by_weight(self, term: EffectTerm) -> tuple[FloatArray, IntArray]:
@@ -249,9 +255,8 @@ class ModelEvidence:
         levels = self.levels if levels is None else levels
         broad = self._broadest(terms)
         if broad is None:
-            none = np.array([self._whitened.gram(level)[2] for level in levels])
             found = gained_over_cases(self.projected(terms, levels), combinations)
-            return none[:, None] + found, combinations
+            return self.none.take(levels)[:, None] + found, combinations
         narrow, others = (*terms[:broad], *terms[broad + 1 :]), (*grids[:broad], *grids[broad + 1 :])
         rows = np.array(list(product(*others)))
         problem = self.projected(narrow, levels) if narrow else None
@@ -270,7 +275,7 @@ class ModelEvidence:
         deviations of its coefficients at the prior scales, both None where there is nothing else.
         """
         broad = self._broadest(terms)
-        gram, moment, _ = self._whitened.gram(level)
+        gram, moment = self._whitened.gram(level)
         narrow, prior_scales = tuple(terms), np.asarray(prior_scales, dtype=float)
         across, average = np.zeros((len(moment), 0)), None
         if broad is not None:
@@ -304,7 +309,7 @@ class ModelEvidence:
         problem: the others' MarginalProblem at the levels, None where there are none; prior_scales (m, terms): theirs.
         """
         averages = [self._average(broad, prior_scale, level) for level in levels for prior_scale in grid]
-        none = np.array([self._whitened.gram(level)[2] for level in levels])
+        none = self.none.take(levels)
         alone = none[:, None, None] + np.array([a.evidence for a in averages]).reshape(len(levels), -1, 1)
         if problem is None:
             return np.asarray(alone)
@@ -316,7 +321,7 @@ class ModelEvidence:
         """The Average over the coefficients of a broad term at a prior scale and a level (an index)."""
 
         def make() -> Average:
-            gram, moment, _ = self._whitened.gram(level)
+            gram, moment = self._whitened.gram(level)
             prior = self._prior(term)
             # drives on which this term does not act: no set has an effect twice
             apart = self._whitened.layout[0][term.effect, term.shape, EACH]
@@ -355,19 +360,31 @@ class ModelEvidence:
             value, grid = self.over_strengths(terms, levels=[level])
             return averaged(value, len(terms))[0], grid[value[0].argmax()]
         best = np.ones(len(terms)) if start is None else np.array(start, dtype=float)
-        losses = np.zeros(len(terms))
+        losses, evidence = np.zeros(len(terms)), self._along(terms, level)
         for _ in range(OPTIONS.prior_scale_sweeps):
             before = best.copy()
-            for k, term in enumerate(terms):
-                # the term that is tried comes last, so that the others' part is cached
-                others = *terms[:k], *terms[k + 1 :]
-                grids: list[FloatArray] = [*np.delete(best, k)[:, None], PRIOR_SCALES]
-                value, _ = self.over_strengths((*others, term), grids, [level])
-                best[k], highest = PRIOR_SCALES[value[0].argmax()], value.max()
-                losses[k] = averaged(value, 1)[0] - highest
+            for k in range(len(terms)):
+                value = evidence.of_term(k, best)
+                best[k], highest = PRIOR_SCALES[value.argmax()], value.max()
+                losses[k] = averaged(value, 1) - highest
             if (best == before).all():
                 break
         return highest + losses.sum(), best
+
+    def _along(self, terms: Sequence[EffectTerm], level: int) -> "_AlongPriorScales":
+        """The log evidence of more than one term along each of their prior scales."""
+        broad, none = self._broadest(terms), self.none[[level]]
+        narrow = [term for k, term in enumerate(terms) if k != broad]
+        problem = self.projected(narrow, [level])
+        if broad is None:
+            return _AlongPriorScales(problem, lambda _: (none, problem), None)
+
+        def after(prior_scales: FloatArray) -> tuple[FloatArray, MarginalProblem]:
+            averages = [self._average(terms[broad], prior_scale, level) for prior_scale in prior_scales]
+            gram, moment = (np.array(part) for part in zip(*(a.rest(problem.index) for a in averages), strict=True))
+            return none + np.array([a.evidence for a in averages]), problem.on(gram, moment)
+
+        return _AlongPriorScales(problem, after, broad)
 
     @_on_complete
     def scales(self, terms: Sequence[EffectTerm], prior_scales: Sequence[float] | FloatArray) -> FloatArray:
@@ -418,6 +435,49 @@ class ModelEvidence:
         return over_cases(self.projected(terms, [level]), np.asarray(prior_scales)[None])
 
 
+class _AlongPriorScales:
+    """Log evidence of a set of terms at one level along the prior scale of one of them, those of the others fixed.
+
+    after: from prior scales (s,) of the broad term to its log evidence (s,) and the MarginalProblem of the others after
+    the average over its coefficients; broad: its number, None where there is none.
+    """
+
+    def __init__(
+        self,
+        problem: MarginalProblem,
+        after: Callable[[FloatArray], tuple[FloatArray, MarginalProblem]],
+        broad: int | None,
+    ) -> None:
+        self._after, self._broad = after, broad
+        self._owner = problem.owner[: len(problem.owner) - len(problem.weights)]
+        self._made: dict[tuple[int, float], tuple[FloatArray, MarginalProblem]] = {}
+
+    def of_term(self, k: int, prior_scales: FloatArray) -> FloatArray:
+        """Log evidence (s,) at PRIOR_SCALES of term k, and at prior_scales (terms,) of the others."""
+        others = prior_scales if self._broad is None else np.delete(prior_scales, self._broad)
+        if k == self._broad:
+            alone, problem = self._cached(-1, np.inf)
+            return alone + gained_over_cases(problem, others[None])[:, 0]
+        number = k - int(self._broad is not None and k > self._broad)
+        rows = np.repeat(others[None], len(PRIOR_SCALES), axis=0)
+        rows[:, number] = PRIOR_SCALES
+        alone, problem = self._cached(number, 1.0 if self._broad is None else float(prior_scales[self._broad]))
+        return alone + gained_over_cases(problem, rows)[0]
+
+    def _cached(self, last: int, of_broad: float) -> tuple[FloatArray, MarginalProblem]:
+        """What `after` gives at a prior scale of the broad term, or at all of them (inf).
+
+        The columns of the term `last`, if any, come last, so that a factor of the others' is made once.
+        """
+        if (-1, of_broad) not in self._made:
+            self._made[-1, of_broad] = self._after(PRIOR_SCALES if np.isinf(of_broad) else np.array([of_broad]))
+        if (last, of_broad) not in self._made:
+            alone, problem = self._made[-1, of_broad]
+            columns = np.argsort(self._owner == last, kind="stable")
+            self._made[last, of_broad] = alone, problem.reordered(range(len(problem.at_least)), columns)
+        return self._made[last, of_broad]
+
+
 def averaged(value: FloatArray, terms: int) -> FloatArray:
-    """Log evidence (levels,) over some terms' prior scales from (levels, m); a grid cut short counts as a whole one."""
+    """Log evidence (..) over some terms' prior scales from (.., m); a grid cut short counts as a whole one."""
     return np.asarray(log_sum_exp(value) - terms * np.log(len(PRIOR_SCALES)))

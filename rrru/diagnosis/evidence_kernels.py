@@ -21,6 +21,8 @@ _LOW_Z, _HIGH_Z, _PER_Z = -30.0, 9.0, 32
 _LOG_TOLERANCE, _MAX_LOG_SWEEPS = 0.02, 30
 # smallest share of a precision that rounding leaves without the coefficient's own factor
 _MIN_CAVITY = 1e-10
+# rows that are looked back on for an equal one
+_LOOK_BACK = 64
 # product of pivots at which its logarithm is taken, far from overflow
 _MAX_PRODUCT = 1e200
 # columns of expectation propagation: precision and shift of a factor; of the coefficient without its factor (cavity)
@@ -265,6 +267,23 @@ def _find_moments(
 
 
 @numba.njit(cache=True, error_model="numpy")
+def _earlier_alike(rows: FloatArray) -> IntArray:
+    """Number (m,) of a row before each of some rows (m, k) that is equal to it, its own where there is none near it."""
+    m, k = rows.shape
+    result = np.arange(m)
+    for j in range(m):
+        for i in range(max(j - _LOOK_BACK, 0), j):
+            # rows differ most often in their last entries
+            c = k - 1
+            while c >= 0 and rows[i, c] == rows[j, c]:
+                c -= 1
+            if c < 0:
+                result[j] = result[i]
+                break
+    return result
+
+
+@numba.njit(cache=True, error_model="numpy")
 def log_evidence_and_correction(
     gram: FloatArray, moment: FloatArray, scale: FloatArray, positive: BoolArray
 ) -> tuple[FloatArray, FloatArray]:
@@ -277,12 +296,19 @@ def log_evidence_and_correction(
     logs[0, 1] = 1.0
     inverse, mean, covariance = np.zeros((p, k)), np.empty(p), np.empty((p, p))
     order, state = np.empty(p, dtype=np.int64), np.empty((p, COLUMNS))
+    # prior scales that an effect's upper bound caps have the same deviations
+    same = _earlier_alike(scale)
     for level in range(v):
+        before = 0
         for j in range(m):
+            if same[j] < j:
+                result[level, j], corrections[level, j] = result[level, same[j]], corrections[level, same[j]]
+                continue
             # rows of the factor stay as long as no scale up to them changes
             first = 0
-            while j > 0 and first < k and scale[j, first] == scale[j - 1, first]:
+            while j > 0 and first < k and scale[j, first] == scale[before, first]:
                 first += 1
+            before = j
             _factorize(gram[level], moment[level], scale[j], first, low, half, squares, logs)
             total = 0.5 * (squares[k] - logs[k, 0] - math.log(logs[k, 1]))
             if p:
@@ -332,18 +358,7 @@ def log_evidence(gram: FloatArray, moment: FloatArray, scale: FloatArray, positi
     gram (v, k, k), moment (v, k): of the whitened columns, for v noise levels; scale (m, k): prior standard deviations;
     positive (k,): coefficients that cannot be negative, whose prior is half-normal. Returns (v, m).
     """
-    if np.count_nonzero(positive) < 2:
-        return log_evidence_and_correction(gram, moment, scale, positive)[0]
-    # prior scales that an effect's upper bound caps have the same deviations, and moments take long
-    distinct, which = _distinct(scale)
-    return log_evidence_and_correction(gram, moment, scale[distinct], positive)[0][:, which]
-
-
-def _distinct(rows: FloatArray) -> tuple[IntArray, list[int]]:
-    """Numbers (d,) of the first of each of the distinct rows (m, k), and which of these each row is (m,)."""
-    first: dict[bytes, int] = {}
-    which = [first.setdefault(row.tobytes(), len(first)) for row in rows]
-    return np.unique(which, return_index=True)[1], which
+    return log_evidence_and_correction(gram, moment, scale, positive)[0]
 
 
 def log_sum_exp(value: FloatArray) -> FloatArray:

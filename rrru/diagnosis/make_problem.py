@@ -17,6 +17,7 @@ from rrru.campaign.driven_path import (
     drive_rates,
     driven_path,
     passes_points,
+    path_through,
     smooth_drives,
     starts_of_runs,
     stops,
@@ -166,7 +167,7 @@ def _unknown_approach(measurements: pd.DataFrame, mechanism: Robot, course: Cour
     result = np.repeat(starts[:, None], course.drive.shape[1], axis=1)
     if course.stops:
         return result
-    finer, _ = driven_path(measurements, OPTIONS.finer_spline_degree)
+    finer = path_through(measurements, OPTIONS.finer_spline_degree)
     other = _path_drive(measurements, finer, (mechanism, course.drive, course.path_index), OPTIONS.finer_spline_degree)
     first = np.diff(stop, prepend=-1) > 0
     return result | at_reversals(course, other, rest_widths(course.drive[first], run[first], mechanism.parts.units))

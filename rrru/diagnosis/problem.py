@@ -155,7 +155,7 @@ class DiagnosisProblem:
         """The measurement table, row by row of what was read (m)."""
         return self.measurements.iloc[self.at]
 
-    @property
+    @cached_property
     def run(self) -> IntArray:
         """Run numbers (m,)."""
         return np.asarray(self.measurements["run"].to_numpy()[self.at])

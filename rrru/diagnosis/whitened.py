@@ -100,16 +100,33 @@ class Whitened:
         return np.concatenate([np.einsum("ij,ij->j", part, part) for part in (columns, sums)]) / self.noise.mean_mm**2
 
     @cached_property
-    def _made(self) -> dict[int, tuple[FloatArray, FloatArray, float]]:
+    def _made(self) -> dict[int, tuple[FloatArray, FloatArray]]:
         """Grams of the levels that have been asked for."""
         return {}
 
-    def _white(self, level: int) -> tuple[FloatArray, FloatArray, int]:
-        """Whitened columns (m, k), of which the first p are the calibration's; variances; and p.
+    @cached_property
+    def _calibration(self) -> tuple[FloatArray, FloatArray]:
+        """Columns of the calibration, and the data, (m, 3, p + 1), by the runs' cosines; waves (m,)."""
+        return along_runs(np.concatenate([self.linear.base, self.linear.data[..., None]], axis=-1), self.run)
 
-        The last rows are the priors of the calibration's parameters.
+    def none(self, level: int) -> tuple[float, float]:
+        """Log evidence of no effect at all at a level (an index), and the limit of that of any effects there.
+
+        The limit is that of effects which explain everything, and whose coefficients cost nothing.
         """
-        (cosines, wave), p, unit = self._together, self.linear.base.shape[-1], self.noise.mean_mm
+        white, variance = self._white(level, self._calibration)
+        basis, triangle = np.linalg.qr(white[:, :-1])
+        left = white[:, -1] - basis @ (basis.T @ white[:, -1])
+        limit = -0.5 * np.log(variance).sum() - np.log(np.abs(np.diag(triangle))).sum()
+        return float(limit - 0.5 * left @ left), float(limit)
+
+    def _white(self, level: int, by_cosines: tuple[FloatArray, FloatArray]) -> tuple[FloatArray, FloatArray]:
+        """Columns (m, 3, k) by the runs' cosines, whitened (m, k), and their variances.
+
+        The calibration's columns come first, the data last. The last rows are the priors of the calibration's
+        parameters.
+        """
+        (cosines, wave), p, unit = by_cosines, self.linear.base.shape[-1], self.noise.mean_mm
         own = self.noise.variance(wave, lengths(self.run)) / unit**2
         variance = own + discrepancy_scales(self.noise)[level] ** 2 * spectrum(wave)[:, None]
         prior = np.zeros((0, cosines.shape[-1]))
@@ -123,22 +140,21 @@ class Whitened:
         white = np.empty((variance.size + len(prior), cosines.shape[-1]))
         np.divide(cosines, (unit * np.sqrt(variance))[..., None], out=white[: variance.size].reshape(cosines.shape))
         white[variance.size :] = prior
-        return white, variance, p
+        return white, variance
 
-    def gram(self, level: int) -> tuple[FloatArray, FloatArray, float]:
-        """Gram matrix (k, k) of the whitened columns at a level (an index), their moments (k,), log evidence of none.
+    def gram(self, level: int) -> tuple[FloatArray, FloatArray]:
+        """Gram matrix (k, k) of the whitened columns at a level (an index), and their moments (k,).
 
         The calibration is projected out.
         """
         if level not in self._made:
-            white, variance, p = self._white(level)
-            basis, triangle = np.linalg.qr(white[:, :p])
+            white, p = self._white(level, self._together)[0], self.linear.base.shape[-1]
+            basis = np.linalg.qr(white[:, :p])[0]
             rest = white[:, p:]
             rest -= basis @ (basis.T @ rest)
             gram, sums = rest.T @ rest, self.layout[1]
-            none = -0.5 * np.log(variance).sum() - np.log(np.abs(np.diag(triangle))).sum() - 0.5 * gram[-1, -1]
             gram, moment = gram[:-1, :-1], gram[:-1, -1]
             across = gram @ sums
             gram = np.block([[gram, across], [across.T, sums.T @ across]])
-            self._made[level] = gram, np.concatenate([moment, sums.T @ moment]), none
+            self._made[level] = gram, np.concatenate([moment, sums.T @ moment])
         return self._made[level]

@@ -240,9 +240,14 @@ def p_value(data: FloatArray, columns: FloatArray, block: FloatArray) -> float:
 
     1 where the columns hold the block; see `rrru.estimation.f_test`.
     """
-    flat = np.concatenate([columns, block], axis=-1).reshape(data.size, -1)
-    (left, share), (without, its_share) = (_left(data.ravel(), part) for part in (flat, flat[:, : columns.shape[-1]]))
-    freedom, rank = round(float(share.sum())), round(float((its_share - share).sum()))
+    flat = np.concatenate([columns, block, data[..., None]], axis=-1).reshape(data.size, -1)
+    # a triangle has the sums of squares and the ranks of the columns that it is of
+    triangle = qr(flat / np.maximum(np.linalg.norm(flat, axis=0), 1e-300), mode="r", check_finite=False)[0]
+    triangle = triangle[: triangle.shape[1]]
+    both, alone = (_left(triangle[:, -1], triangle[:, :count]) for count in (-1, columns.shape[-1]))
+    (left, share), (without, its_share) = both, alone
+    freedom = data.size - round(float((1.0 - share).sum()))
+    rank = round(float((its_share - share).sum()))
     if rank < 1 or freedom < 1:
         return 1.0
     unexplained = float(left @ left)
@@ -305,8 +310,10 @@ def _left(data: FloatArray, columns: FloatArray) -> tuple[FloatArray, FloatArray
         parts = np.array_split(unit, len(unit) // _AT_ONCE + 1)
         taken = np.concatenate([((part @ root) ** 2).sum(axis=1) for part in parts])
         return data - unit @ (root @ (root.T @ (unit.T @ data))), np.clip(1.0 - taken, 0.0, 1.0)
-    basis, triangle, _ = qr(unit, mode="economic", pivoting=True)
-    basis = basis[:, np.abs(np.diag(triangle)) > _RANK * np.abs(triangle[0, 0])]
+    # the pivots of the triangle are those of the columns, and are found in a fraction of the time
+    basis, triangle = qr(unit, mode="economic", check_finite=False)
+    turned, pivots, _ = qr(triangle, mode="economic", pivoting=True)
+    basis = basis @ turned[:, np.abs(np.diag(pivots)) > _RANK * np.abs(pivots[0, 0])]
     return data - basis @ (basis.T @ data), np.clip(1.0 - (basis**2).sum(axis=1), 0.0, 1.0)
 
 

@@ -145,3 +145,33 @@ def test_drives_have_a_corner_where_the_path_of_the_tool_has_one():
     drives[course["path_index"]] = 0.01 * command
     smooth = smooth_drives(frame, drives, course["path_index"])
     np.testing.assert_allclose(smooth, 0.01 * path, atol=1e-12)
+
+
+def test_runs_together_are_those_of_each_run_alone():
+    """Of equal steps and times, of others, with corners, of points twice, of one and of two points, without times."""
+    generator = np.random.default_rng(4)
+    straight = np.outer(np.linspace(0.0, 1.0, 6), [30.0, 40.0, 0.0])
+    corner, even = _along(_AROUND[:3], 6), np.linspace(0.0, 2.0, 6)
+    twice = np.repeat(generator.uniform(5.0, 20.0, (7, 3)).cumsum(axis=0), 2, axis=0)
+    points = [
+        *(straight + place for place in generator.normal(size=(3, 3))),
+        straight @ np.diag([1.0, -1.0, 1.0]),
+        corner,
+        twice,
+        straight[:1],
+        straight[1:3],
+        *np.cumsum(generator.uniform(5.0, 20.0, (3, 9, 3)), axis=1),
+    ]
+    time = [even, even, even + 0.5, even**2, None, *(np.sort(generator.uniform(0.0, 9.0, len(p))) for p in points[5:])]
+    tables = [_table(p, t).assign(run=k) for k, (p, t) in enumerate(zip(points, time, strict=True), start=1)]
+    path, course = driven_path(pd.concat(tables, ignore_index=True))
+    first = 0
+    for table in tables:
+        alone, its_course = driven_path(table)
+        here = slice(first, first + len(table))
+        begin = course["path_index"][here][0]
+        np.testing.assert_allclose(path[begin : begin + len(alone)], alone, atol=1e-9)
+        np.testing.assert_array_equal(course["path_index"][here] - begin, its_course["path_index"])
+        for name in ("velocity_mm_s", "acceleration_mm_s2"):
+            np.testing.assert_allclose(course[name][here], its_course[name], rtol=1e-9, atol=1e-9)
+        first += len(table)

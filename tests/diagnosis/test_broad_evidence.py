@@ -1,7 +1,7 @@
 """Terms of many coefficients, which are averaged over first, against the marginal likelihood of the whole model."""
 
 from dataclasses import dataclass, replace
-from itertools import product
+from itertools import permutations, product
 from types import SimpleNamespace
 
 import numpy as np
@@ -14,6 +14,7 @@ from scipy.stats import multivariate_normal, norm
 from rrru.diagnosis.evidence import PRIOR_SCALES, ModelEvidence
 from rrru.diagnosis.hypothesis import Hypothesis
 from rrru.diagnosis.marginal_problem import Average
+from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.state import LinearizedProblem
 from rrru.diagnosis.terms import EffectTerm
 from rrru.diagnosis.whitened import DISCREPANCY_SCALES
@@ -244,13 +245,45 @@ def test_evidence_where_the_payload_is_fitted_is_that_of_the_exact_product(size,
 
 def test_alone_it_is_averaged_over_all_prior_scales_and_levels():
     evidence = _evidence(2, smooth=True)
-    found, grid = evidence.over_strengths((ROUGH,))
+    found, grid = evidence.over_strengths((ROUGH,), levels=range(len(DISCREPANCY_SCALES)))
     assert found.shape == (len(DISCREPANCY_SCALES), len(PRIOR_SCALES)) and grid[:, 0].tolist() == PRIOR_SCALES.tolist()
     expected = [Dense.of(evidence, (ROUGH,), (prior_scale,)).likelihood for prior_scale in PRIOR_SCALES]
     np.testing.assert_allclose(found[0], expected, rtol=1e-8)
     alone, best = evidence.over_all_strengths((ROUGH,), 0)
     np.testing.assert_allclose(alone, logsumexp(expected) - np.log(len(PRIOR_SCALES)), rtol=1e-8)
     assert best[0] == PRIOR_SCALES[np.argmax(expected)]
+
+
+@pytest.mark.parametrize("with_shapes", [False, True], ids=["", "with shapes"])
+def test_prior_scales_averaged_in_turn_are_those_of_single_grids(with_shapes):
+    """The slow way: a new problem for every term, and one that is asked for in another order each time."""
+    evidence = _evidence(1, with_shapes)
+    for terms in [*permutations((OTHER, FREE, ROUGH)), (FREE, OTHER, FINE, ROUGH)]:
+        best, losses, highest = np.ones(len(terms)), np.zeros(len(terms)), -np.inf
+        for _ in range(OPTIONS.prior_scale_sweeps):
+            for k in range(len(terms)):
+                grids = [[one] for one in best]
+                grids[k] = PRIOR_SCALES
+                value = evidence.over_strengths(terms, grids, [0])[0][0]
+                best[k], highest = PRIOR_SCALES[value.argmax()], value.max()
+                losses[k] = logsumexp(value) - np.log(len(PRIOR_SCALES)) - highest
+        found, scales = evidence.over_all_strengths(terms, 0)
+        np.testing.assert_allclose(scales, best)
+        np.testing.assert_allclose(found, highest + losses.sum(), rtol=1e-9)
+
+
+def test_no_effects_matter_at_a_level_that_is_left_out():
+    """Not even those that explain everything but the noise."""
+    evidence = _evidence(2, smooth=True)
+    left_out = sorted(set(range(len(DISCREPANCY_SCALES))) - set(evidence.levels.tolist()))
+    assert 0 < len(left_out) < len(DISCREPANCY_SCALES)
+    for terms in _SETS:
+        found, _ = evidence.over_strengths(terms, levels=left_out)
+        assert found.max() < evidence.none.max() - OPTIONS.negligible_nats
+    # and the limit is one of any data that the effects of a model leave
+    exact = replace(evidence, linear=replace(evidence.linear, data=np.zeros_like(evidence.linear.data)))
+    limits = [evidence._whitened.none(level)[1] for level in left_out]
+    np.testing.assert_allclose([exact.none[level] for level in left_out], limits, rtol=1e-12)
 
 
 @pytest.mark.parametrize("terms", _SETS[:-2], ids=lambda terms: "+".join(term.effect for term in terms))

@@ -93,9 +93,9 @@ def test_scores_equal_a_dense_marginal_likelihood(level, legs):
     size = _unit_size(evidence, columns, typical)
     expected = [_marginal(evidence, columns, np.diag((s * size) ** 2), level) for s in PRIOR_SCALES]
     term = EffectTerm("legged", 0, legs)
-    found, grid = evidence.over_strengths((term,))
+    found, grid = evidence.over_strengths((term,), levels=[level])
     np.testing.assert_allclose(grid[:, 0], PRIOR_SCALES)
-    np.testing.assert_allclose(found[level], expected, rtol=1e-8)
+    np.testing.assert_allclose(found[0], expected, rtol=1e-8)
     alone, best = evidence.over_all_strengths((term,), level)
     np.testing.assert_allclose(alone, logsumexp(expected) - np.log(len(PRIOR_SCALES)), rtol=1e-8)
     assert best[0] == PRIOR_SCALES[np.argmax(expected)]
@@ -120,8 +120,8 @@ def test_two_terms_and_shape_parameters_equal_a_dense_marginal_likelihood(level)
     for first, second in product(PRIOR_SCALES, PRIOR_SCALES):
         prior = np.concatenate([first * sizes[0], second * sizes[1], np.ones(2)])
         expected.append(_marginal(evidence, together, np.diag(prior**2), level))
-    found, _ = evidence.over_strengths((EffectTerm("free"), EffectTerm("legged")))
-    np.testing.assert_allclose(found[level], expected, rtol=1e-7)
+    found, _ = evidence.over_strengths((EffectTerm("free"), EffectTerm("legged")), levels=[level])
+    np.testing.assert_allclose(found[0], expected, rtol=1e-7)
 
 
 @pytest.mark.parametrize("level", [0, 4])

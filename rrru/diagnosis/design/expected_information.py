@@ -49,16 +49,28 @@ class Sums:
 
     def nats(self) -> float:
         """Half of the least squares that the design leaves of the data."""
-        unit = 1.0 / np.sqrt(np.maximum(np.diag(self.precision), 1e-300))
-        scaled = unit[:, None] * self.precision * unit + 1e-12 * np.eye(len(unit))
-        moment = unit * self.moment
-        return float(0.5 * (self.square - moment @ np.linalg.solve(scaled, moment)))
+        return float(_nats(self.precision[None], self.moment[None], np.array([self.square]))[0])
+
+    def nats_with(self, others: Sequence["Sums"]) -> FloatArray:
+        """`nats` (c,) of the sum of these and each of some others."""
+        precision = self.precision + np.array([other.precision for other in others])
+        moment = self.moment + np.array([other.moment for other in others])
+        return _nats(precision, moment, self.square + np.array([other.square for other in others]))
 
     def cost(self) -> float:
         """Minus the log marginal likelihood up to a constant: `nats` and half of the log determinant."""
         unit = 1.0 / np.sqrt(np.maximum(np.diag(self.precision), 1e-300))
         scaled = unit[:, None] * self.precision * unit + 1e-12 * np.eye(len(unit))
         return self.nats() + 0.5 * float(np.linalg.slogdet(scaled)[1] - 2.0 * np.log(unit).sum())
+
+
+def _nats(precision: FloatArray, moment: FloatArray, square: FloatArray) -> FloatArray:
+    """`Sums.nats` (c,) of c sums: precision (c, k, k), moment (c, k), square (c,)."""
+    unit = 1.0 / np.sqrt(np.maximum(np.einsum("cii->ci", precision), 1e-300))
+    scaled = unit[:, :, None] * precision * unit[:, None, :] + 1e-12 * np.eye(moment.shape[1])
+    moment = unit * moment
+    solved = np.linalg.solve(scaled, moment[..., None])[..., 0]
+    return np.asarray(0.5 * (square - (moment * solved).sum(axis=1)))
 
 
 def worth(
@@ -125,10 +137,11 @@ def greedy(now: Sums, candidates: Sequence[Sums], most: int) -> tuple[list[int],
 
     now: Sums at the start; candidates: Sums of each.
     """
-    chosen, start = [], now.nats()
+    chosen: list[int] = []
+    start = now.nats()
     for _ in range(min(most, len(candidates))):
         left = [k for k in range(len(candidates)) if k not in chosen]
-        best = max(left, key=lambda k: (now + candidates[k]).nats())
+        best = left[int(now.nats_with([candidates[k] for k in left]).argmax())]
         chosen.append(best)
         now = now + candidates[best]
     return chosen, now.nats() - start
