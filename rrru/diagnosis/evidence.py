@@ -457,12 +457,12 @@ class _AlongPriorScales:
         others = prior_scales if self._broad is None else np.delete(prior_scales, self._broad)
         if k == self._broad:
             alone, problem = self._cached(-1, np.inf)
-            return alone + gained_over_cases(problem, others[None])[:, 0]
+            return np.asarray(alone + gained_over_cases(problem, others[None])[:, 0])
         number = k - int(self._broad is not None and k > self._broad)
         rows = np.repeat(others[None], len(PRIOR_SCALES), axis=0)
         rows[:, number] = PRIOR_SCALES
         alone, problem = self._cached(number, 1.0 if self._broad is None else float(prior_scales[self._broad]))
-        return alone + gained_over_cases(problem, rows)[0]
+        return np.asarray(alone + gained_over_cases(problem, rows)[0])
 
     def _cached(self, last: int, of_broad: float) -> tuple[FloatArray, MarginalProblem]:
         """What `after` gives at a prior scale of the broad term, or at all of them (inf).
