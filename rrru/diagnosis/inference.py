@@ -336,7 +336,7 @@ def _rounds(problem: DiagnosisProblem, calibrated: ModelState, prior: Prior, sta
     terms: tuple[EffectTerm, ...] = ()
     for _ in range(OPTIONS.max_search_rounds):
         space = ModelSpace(evidence.on_library(), prior)
-        first, confirmed = space.search(terms), False
+        first, confirmed = space.climb(terms), False
         posterior = space.posterior([first])
         while True:
             hypothesis, level = posterior.best()
@@ -352,7 +352,7 @@ def _rounds(problem: DiagnosisProblem, calibrated: ModelState, prior: Prior, sta
             ended |= settled and (tried is hypothesis or not tried.terms)
             if confirmed or not ended:
                 break
-            # an answer is accepted once a search from the other end has found nothing better
+            # an answer is accepted once the whole search, and one from the other end, have found nothing better
             posterior, confirmed = space.confirmed(first), True
         terms = hypothesis.terms
         if ended:
@@ -373,7 +373,7 @@ def _rounds(problem: DiagnosisProblem, calibrated: ModelState, prior: Prior, sta
         evidence = problem.evidence(linear)
     else:
         space = ModelSpace(evidence.on_library(), prior)
-        first, confirmed = space.search(terms), False
+        first, confirmed = space.climb(terms), False
     if not confirmed:
         posterior = space.confirmed(first)
     hypothesis, level = posterior.best()

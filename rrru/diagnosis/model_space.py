@@ -18,7 +18,9 @@ of them. Errors of payload and tilt count in the set and not in the term, and si
 of a: it is for choosing sets, not for weighing them.
 
 Two searches start from opposite ends, from nothing and from as many effects as the data bear. How far the probabilities
-of causes differ between what each of them has visited says whether the answer depends on where one starts.
+of causes differ between what each of them has visited says whether the answer depends on where one starts. As long as
+the linearisation moves with the answer, a search only climbs: it ends at a set that is more probable than all of its
+neighbours, and is completed once its answer has come back.
 """
 
 from collections.abc import Collection, Iterable, Sequence
@@ -50,7 +52,7 @@ def explore(
     are ruled out.
     """
     space = ModelSpace(evidence, prior, without, most)
-    return space.confirmed(space.search(()))
+    return space.confirmed(space.climb(()))
 
 
 @dataclass
@@ -87,8 +89,11 @@ class ModelSpace:
         return Candidates(self._evidence, self._terms)
 
     def confirmed(self, first: _Search) -> Posterior:
-        """The Posterior after a search and one from the other end; where these differ, after one from both answers."""
-        searches = [first, self.search(self.fullest())]
+        """The Posterior after a search, completed, and one from the other end.
+
+        Where these differ, one begins from both answers as well.
+        """
+        searches = [self.completed(first), self.search(self.fullest())]
         found = self.posterior(searches)
         if found.apart > OPTIONS.max_searches_apart:
             best = [max(one.reached, key=lambda key: self._known[key].height) for one in searches]
@@ -112,16 +117,25 @@ class ModelSpace:
 
     def search(self, start: Sequence[EffectTerm]) -> _Search:
         """A search from a set of terms on, until no set is left whose neighbours matter or the time is up."""
+        return self.completed(self.climb(start))
+
+    def climb(self, start: Sequence[EffectTerm]) -> _Search:
+        """A search from a set of terms on, until the neighbours of the most probable set have been evaluated."""
         known = {term for term in start if term in self._terms}
         found, first = _Search(), frozenset(known)
         self._evaluate(tuple(term for term in start if term in known), None, None, climb=True)
         for terms in ((), *((term,) for term in self._terms), first):
             found.reach(terms)
-        upcoming: frozenset[EffectTerm] | None = first
-        while upcoming is not None and len(found.expanded) < OPTIONS.max_expanded_sets:
-            found.expanded[upcoming] = None
-            self._expand(self._known[upcoming], found)
-            upcoming = self._next(found)
+        upcoming = first
+        while upcoming not in found.expanded and len(found.expanded) < OPTIONS.max_expanded_sets:
+            self._expand(upcoming, found)
+            upcoming = max(found.reached, key=lambda key: self._known[key].height)
+        return found
+
+    def completed(self, found: _Search) -> _Search:
+        """The search continued until no set is left whose neighbours matter or the time is up."""
+        while len(found.expanded) < OPTIONS.max_expanded_sets and (upcoming := self._next(found)) is not None:
+            self._expand(upcoming, found)
         return found
 
     def _next(self, found: _Search) -> frozenset[EffectTerm] | None:
@@ -162,8 +176,10 @@ class ModelSpace:
         total[may_act] = averaged(gains[may_act], 1)
         return total, PRIOR_SCALES[gains.argmax(axis=1)]
 
-    def _expand(self, centre: Weighed, found: _Search) -> None:
+    def _expand(self, key: frozenset[EffectTerm], found: _Search) -> None:
         """Evaluate those of a set's neighbours that may matter."""
+        found.expanded[key] = None
+        centre = self._known[key]
         terms, level = centre.hypothesis.terms, centre.hypothesis.level
         prior_scales, present = centre.hypothesis.prior_scales[level], centre.hypothesis.evidence.max()
         chosen = []

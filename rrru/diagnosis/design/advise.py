@@ -8,7 +8,7 @@ worth f times as much. No candidate exceeds the limits of the robot, see
 `rrru.diagnosis.design.run_limits`.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 
@@ -26,6 +26,7 @@ from rrru.diagnosis.make_problem import make_diagnosis_problem
 from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.problem import DiagnosisProblem
 from rrru.diagnosis.verdict import Verdict
+from rrru.effects.protocol import LOADS, PATH
 from rrru.kinematics.dynamics import Masses
 
 RUN = ("run", "kind", "trajectory", "reverse", "speed_mm_s", "payload_kg", "points")
@@ -34,6 +35,8 @@ _POSE = ("pose", *(f"{end}_{axis}_mm" for end in ("from", "to") for axis in "xyz
 _POSE += (*(f"command_r{axis}_rad" for axis in "xyz"), "speed_mm_s", "payload_kg")
 # words for a pass that repeats one that was driven
 _AGAIN = "once more"
+# needs of effects that the speed of a pass does not change
+_ALIKE_AT_ANY_SPEED = {PATH, "drive", "position_mm", "payload_kg", "temperature_c"}
 # kinds of further passes: in reverse, fast, loaded
 _KINDS = ((False, False, False), (True, False, False), (False, True, False), (False, False, True), (True, True, True))
 
@@ -174,7 +177,7 @@ def _poses(
     stated_speed, own_load = (float(problem.measurements[name].median()) for name in ("speed_mm_s", "payload_kg"))
     own_speed = stated_speed if np.isfinite(stated_speed) else _speed(problem.measurements)
     last_s, own_load, most = _end_s(problem.measurements), float(np.nan_to_num(own_load)), 0.0
-    for fast, loaded in product((False, True), repeat=2):
+    for fast, loaded in _harder(problem, contest):
         speed = limits.fast(stated_speed, np.full(1, np.nan)) if fast else own_speed
         load = limits.loaded_kg(own_load) if loaded else own_load
         if (fast and not (speed > stated_speed and np.isfinite(last_s))) or (loaded and not load > own_load):
@@ -201,6 +204,17 @@ def _poses(
             listed = some.listed(chosen).assign(speed_mm_s=speed, payload_kg=load)
             best = [{"contest": 0, **dict(zip(_COLUMNS, row, strict=True))}], listed
     return best
+
+
+def _harder(problem: DiagnosisProblem, contest: Contest) -> Iterator[tuple[bool, bool]]:
+    """Whether passes are faster, and whether they are with a higher payload, as far as an effect of a Contest differs.
+
+    Passes at which every effect is the same as at others decide no more than these.
+    """
+    terms = [term for hypothesis, _ in (contest.truth, contest.rival) for term in hypothesis.terms]
+    needs = {need for term in terms for need in problem.library[term.effect].needs}
+    by_speed, by_load = needs - _ALIKE_AT_ANY_SPEED, needs & {*LOADS, "payload_kg"}
+    return product((False, True) if by_speed else (False,), (False, True) if by_load else (False,))
 
 
 def _how(fast: bool, loaded: bool, speed: float, load: float) -> list[str]:
