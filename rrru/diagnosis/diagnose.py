@@ -98,7 +98,7 @@ class Diagnosis:
     decided: Verdict
 
 
-def with_wide_bounds(mechanism: Any) -> Any:
+def with_wide_bounds(mechanism: Robot) -> Robot:
     """The mechanism with bounds wide enough for a gap to appear in the deviations."""
     return mechanism.widened(OPTIONS.parameter_bound_rad, OPTIONS.parameter_bound_mm)
 

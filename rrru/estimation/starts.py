@@ -8,24 +8,26 @@ small there, and their priors and bounds keep their meaning. Lost zero offsets o
 """
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
 import pandas as pd
 from scipy.spatial.transform import Rotation
 
-from rrru.arrays import FloatArray
+from rrru.arrays import FloatArray, IntArray
 from rrru.campaign import measurements as rows
 from rrru.campaign.target_registration import TargetReadings, TargetRegistration, register_targets
 from rrru.errors import FitError
 from rrru.estimation.estimate import Estimate
 from rrru.estimation.parameters import Block, Parameters
-from rrru.estimation.problem import Problem
+from rrru.estimation.problem import Observations, Problem
 from rrru.estimation.solver import solve
 from rrru.kinematics.base_parameters import open_numbers
+from rrru.kinematics.chain import Poses
 from rrru.kinematics.legs import TOOL, WORLD
 from rrru.kinematics.readings import Readings, lacking, place_on_platform
+from rrru.kinematics.robot import Robot
 
 # a median residual above this share of the robot's size is not due to errors of its geometry
 FAR_SHARE_OF_SIZE = 2e-3
@@ -41,7 +43,7 @@ _AXES = "xyz"
 
 
 def register_poses(
-    robot: Any, poses: Any, twists: FloatArray, readings: Readings, mirrored: bool = False
+    robot: Robot, poses: Poses, twists: FloatArray, readings: Readings, mirrored: bool = False
 ) -> TargetRegistration:
     """The TargetRegistration of Readings at Poses under twists (1, sites, 6) of a robot.
 
@@ -58,12 +60,20 @@ def register_poses(
         raise FitError(f"{known.sum()} readings at poses that the robot can take; allowed: at least {_MIN_READINGS}")
     orientations = None if readings.turn is None else readings.turn[known]
     arm_mm = readings.arm_mm if np.isfinite(readings.arm_mm) else robot.angle_arm_mm
-    bodies = centre[known], turn[known]
-    targets = readings.position_mm[known], number[known], place, robot.tool_mm
-    return register_targets(TargetReadings(*bodies, *targets, orientations, arm_mm), mirrored)
+    found = TargetReadings(
+        centre[known],
+        turn[known],
+        readings.position_mm[known],
+        number[known],
+        place,
+        np.asarray(robot.tool_mm),
+        orientations,
+        arm_mm,
+    )
+    return register_targets(found, mirrored)
 
 
-def _targets(robot: Any, twists: FloatArray, readings: Readings) -> tuple[list[str], npt.NDArray[np.int_], FloatArray]:
+def _targets(robot: Robot, twists: FloatArray, readings: Readings) -> tuple[list[str], IntArray, FloatArray]:
     """Names (k) of the targets, number (n,) of each reading's, and places (k, 3), NaN where unknown."""
     count = len(readings)
     place = np.broadcast_to(place_on_platform(robot, twists, readings), (count, 3))
@@ -74,7 +84,7 @@ def _targets(robot: Any, twists: FloatArray, readings: Readings) -> tuple[list[s
     return names.tolist(), number, np.where(unknown[:, None], np.nan, place[first])
 
 
-def frame_values(robot: Any, poses: Any, twists: FloatArray, readings: Readings) -> dict[str, float]:
+def frame_values(robot: Robot, poses: Poses, twists: FloatArray, readings: Readings) -> dict[str, float]:
     """Changes of twists (1, sites, 6) that make readings fit, by name of the robot's open numbers.
 
     The exact registration of Readings at Poses, in the names of `rrru.kinematics.base_parameters.open_numbers`. Raises
@@ -100,7 +110,7 @@ def frame_values(robot: Any, poses: Any, twists: FloatArray, readings: Readings)
     }
 
 
-def register_measurements(measurements: pd.DataFrame, robot: Any) -> pd.DataFrame:
+def register_measurements(measurements: pd.DataFrame, robot: Robot) -> pd.DataFrame:
     """A measurement table in the frame of a nominal robot, unchanged where it is near or where that frame is known.
 
     Where the robot's `reads` leave the frame open and its prediction is far off, measured positions and orientations
@@ -133,7 +143,7 @@ def register_measurements(measurements: pd.DataFrame, robot: Any) -> pd.DataFram
     return measurements
 
 
-def _moved(measurements: pd.DataFrame, robot: Any, readings: Readings, found: TargetRegistration) -> pd.DataFrame:
+def _moved(measurements: pd.DataFrame, robot: Robot, readings: Readings, found: TargetRegistration) -> pd.DataFrame:
     """The table in the frame of a TargetRegistration."""
     table = measurements.assign(**rows.vector_columns("measured", found.apply(rows.measured(measurements))))
     if readings.turn is not None:
@@ -147,13 +157,22 @@ def _moved(measurements: pd.DataFrame, robot: Any, readings: Readings, found: Ta
     return table
 
 
-def starting_values(residuals: Any) -> tuple[FloatArray, int]:
+class RobotReadings(Observations, Protocol):
+    """Observations whose parameters are the deviations (p,) of a robot, such as
+    `rrru.estimation.observations.target_positions.TargetPositions`.
+    """
+
+    @property
+    def mechanism(self) -> Robot:
+        """The robot."""
+
+
+def starting_values(residuals: RobotReadings) -> tuple[FloatArray, int]:
     """Deviations (p,) to start from, and how many evaluations it took to find them.
 
-    residuals: `rrru.estimation.observations.target_positions.TargetPositions` or the like, readings in the robot's
-    frame. The nominal ones where the nominal robot is near; else the robot's `stages` one after the other, such as
-    frames and then with these the drives, robustly. A search over all parameters at once would move hardly determined
-    combinations to fit second-order terms of large turns.
+    residuals: of readings in the robot's frame. The nominal ones where the nominal robot is near; else the robot's
+    `stages` one after the other, such as frames and then with these the drives, robustly. A search over all parameters
+    at once would move hardly determined combinations to fit second-order terms of large turns.
     """
     robot, evaluations = residuals.mechanism, 0
     found = np.asarray(robot.parameters.nominal)
@@ -172,7 +191,7 @@ def starting_values(residuals: Any) -> tuple[FloatArray, int]:
 class _Along:
     """Observations whose parameters are changes of some deviations (p,) from an origin."""
 
-    residuals: Any
+    residuals: RobotReadings
     origin: FloatArray
     stage: npt.NDArray[np.bool_]
 
@@ -185,7 +204,7 @@ class _Along:
         return np.asarray(self.residuals.jacobian(self.origin + _spread(values, self.stage)))[..., self.stage]
 
 
-def solve_along(residuals: Any, origin: FloatArray, stage: npt.NDArray[np.bool_]) -> Estimate:
+def solve_along(residuals: RobotReadings, origin: FloatArray, stage: npt.NDArray[np.bool_]) -> Estimate:
     """The robust Estimate of changes (k,) of the deviations of a stage (p,) from an origin (p,)."""
     parameters = [one for one, chosen in zip(residuals.mechanism.parameters, stage, strict=True) if chosen]
     sd = np.array([(one.high - one.low) / np.sqrt(12.0) for one in parameters])

@@ -5,12 +5,15 @@ Payloads in kg, speeds of the tool in mm/s, times in s.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 import numpy.typing as npt
 
 from rrru.diagnosis.options import OPTIONS
+from rrru.diagnosis.problem import DiagnosisProblem
+from rrru.kinematics.dynamics import Masses
+from rrru.kinematics.robot import Robot
 
 # first words of notes that say which candidates are left out
 NO_PAYLOAD, WITHIN_LIMITS = "no run with a payload is proposed", "runs are proposed within the limits"
@@ -80,8 +83,8 @@ class RunLimits:
         return not (speed_mm_s > self.speed_mm_s or payload_kg > self.payload_kg or seconds > self.seconds)
 
 
-def run_limits(problem: Any, masses: Any, stated: StatedLimits) -> tuple[RunLimits, str]:
-    """The RunLimits of a problem with `rrru.kinematics.dynamics.Masses`, and why no payload is proposed, else "".
+def run_limits(problem: DiagnosisProblem, masses: Masses, stated: StatedLimits) -> tuple[RunLimits, str]:
+    """The RunLimits of a problem with Masses, and why no payload is proposed, else "".
 
     A payload that is not stated is what the drives' efforts of the robot's file leave at the campaign's points, else
     `OPTIONS.default_added_payload_kg`; of both no more than a share of what the robot itself moves.
@@ -113,13 +116,13 @@ def run_limits(problem: Any, masses: Any, stated: StatedLimits) -> tuple[RunLimi
     return replace(limits, added_kg=0.0), f"{NO_PAYLOAD}, {why}: state limits.payload_kg"
 
 
-def moved_kg(robot: Any, masses: Any) -> float:
+def moved_kg(robot: Robot, masses: Masses) -> float:
     """Mass in kg that a robot itself moves: platform, arms and forearms, and the point masses of its file."""
     legs = len(robot.parts.members) * masses.forearm_kg + len(robot.parts.drives) * masses.arm_kg
     return float(masses.platform_kg + legs + sum(point_mass.mass_kg for point_mass in robot.point_masses))
 
 
-def _spare_kg(problem: Any) -> float:
+def _spare_kg(problem: DiagnosisProblem) -> float:
     """Mass in kg that the drives' efforts leave at all points of a campaign, beyond its payload; NaN without efforts.
 
     The load on drive k is linear in the mass m at the tool: |tau_k + m dtau_k/dm| has to stay below its effort.
