@@ -38,8 +38,18 @@ class Unknown:
 
     drives: int = 3
     # capabilities of an `rrru.effects.protocol.Effect` that no function has
-    along_drives = with_waves = None
+    with_waves = None
     switches = False
+
+    @property
+    def along_drives(self) -> Callable[[Motion], list[FloatArray]] | None:
+        """Functions (n, k) of a motion for each drive, zero where unknown; None for those of the axes."""
+        return self._of_each_drive if self.per_leg else None
+
+    def _of_each_drive(self, motion: Motion) -> list[FloatArray]:
+        functions = np.nan_to_num(self._cached(motion))
+        each = functions if functions.ndim == 3 else functions[:, None]
+        return [*np.broadcast_to(each, (len(each), self.drives, self.count)).transpose(1, 0, 2)]
 
     @cached_property
     def coordinates(self) -> Coordinates:
@@ -51,9 +61,7 @@ class Unknown:
         """Changes under coefficients (drives or axes times k,)."""
         coefficients, functions = np.reshape(values, (-1, self.count)), self._cached(motion)
         if self.per_leg:
-            each = functions if functions.ndim == 3 else functions[:, None]
-            each = np.broadcast_to(each, (len(each), *coefficients.shape))
-            return motion.at_drives(np.einsum("nlk,lk->nl", each, coefficients))
+            return motion.at_drive_functions(self._of_each_drive(motion), coefficients)
         shift = functions @ coefficients.T
         return motion.at({WORLD: np.concatenate([shift, np.zeros_like(shift)], axis=1)})
 

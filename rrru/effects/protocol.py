@@ -26,6 +26,8 @@ LOADS = {
 }
 # field of a Motion that determines from which side each drive approaches a reading, where `Motion.approach` is NaN
 PATH = "path_drive"
+# key of a motion's cache: the last motion with other loads, as many coefficients are stepped under the same ones
+_UNDER = "under"
 
 
 @dataclass(frozen=True)
@@ -100,12 +102,16 @@ class Motion:
         factors = np.array([extra_kg, *lean_rad, *(extra_kg * lean for lean in lean_rad)])
         if not factors.any():
             return self
-        changed = {
-            name: getattr(self, name)
-            + sum(factor * getattr(slope, attribute) for factor, slope in zip(factors, self.slopes, strict=True))
-            for name, attribute in LOADS.items()
-        }
-        return replace(self, **changed)
+        last = self.cache.get(_UNDER)
+        if last is None or last[0] != tuple(factors):
+            changed = {
+                name: getattr(self, name)
+                + sum(factor * getattr(slope, attribute) for factor, slope in zip(factors, self.slopes, strict=True))
+                for name, attribute in LOADS.items()
+            }
+            last = self.cache[_UNDER] = tuple(factors), replace(self, **changed)
+        loaded: Motion = last[1]
+        return loaded
 
     def with_approach(self, changes: FloatArray, from_below: FloatArray) -> FloatArray:
         """Changes (n, K) of the actuator values with their expected values where the path does not determine them.
