@@ -296,7 +296,7 @@ def likeliest(
     spectra: tuple[tuple[tuple[FloatArray, ...], ...], tuple[bool, ...]],
     fitted: int,
 ) -> tuple[int, float, float, BoolArray]:
-    """The spectrum of highest likelihood of data (m,): its number, the factor of its sizes, the noise, which drives err.
+    """The likeliest spectrum of data (m,): its number, the factor of its sizes, the noise, which drives (K,) err.
 
     columns (m, c); spectra: `roots` and `of_one` as of `Coordinates`. All drives together and each one alone are tried,
     whatever is likeliest counts. fitted: number of parameters fitted together with them.
@@ -311,7 +311,8 @@ def likeliest(
         for its in alone if of_one or len(alone) == 1 else (drive >= 0, *alone):
             value, factor, noise = _likeliest_factor(scaled[np.ix_(its, its)], along[its], square, len(data) - fitted)
             # each drive is as probable as another
-            found.append((value - (not its.all()) * np.log(len(by_drive)), number, factor, noise, np.unique(drive[its])))
+            value -= (not its.all()) * np.log(len(by_drive))
+            found.append((value, number, factor, noise, np.unique(drive[its])))
     _, number, factor, noise, erring = max(found, key=lambda one: one[:2])
     return number, factor, noise, np.isin(np.arange(len(spectra[0][number])), erring)
 

@@ -216,7 +216,10 @@ def _with_significant(
 def _fewer_blocks(
     problem: DiagnosisProblem, linear: LinearizedProblem, blocks: dict[EffectKey, FloatArray]
 ) -> Iterator[tuple[dict[EffectKey, FloatArray], FloatArray | None]]:
-    """Blocks of columns by (effect, shape), in steps less free, and the prior s.d. of all columns with them, or None."""
+    """Blocks of columns by (effect, shape), in steps less free, and the prior s.d. (k,) of all columns with them.
+
+    None for these where nothing is known of any coefficient.
+    """
     library = problem.library
     yield blocks, None
     few = {key: columns for key, columns in blocks.items() if not library[key[0]].coordinates.broad}

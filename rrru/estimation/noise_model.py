@@ -276,7 +276,8 @@ def alike(
     """Design effect of several readings at one stop: 1 + (t - 1) r, t readings at a stop, of correlation r.
 
     data (m, 3), of which columns (m, 3, k) are projected out; stop (m,): of each row; kind (m,): of reading, odd for
-    orientations, which do not count; prior_sd (k,): as for `fit_noise`, over the noise. Source: Kish, Survey Sampling, 1965, section 5.4 (design effect).
+    orientations, which do not count; prior_sd (k,): as for `fit_noise`, over the noise. Source: Kish, Survey Sampling,
+    1965, section 5.4 (design effect).
     """
     counted = kind % 2 == 0
     count = np.bincount(stop[counted], minlength=stop.max() + 1).astype(float)

@@ -109,8 +109,8 @@ def mounting(sheet: Sheet) -> Mounting | None:
         place = place + np.asarray(sheet.mechanism.tool_mm) - np.unique(place, axis=0).mean(axis=0)
     turn = np.eye(3)
     if named and not set(frames.names) <= set(sheet.spec.targets):
-        driven = sheet.actuators(command) + zeros, command
-        by_zeros = _by_zeros(sheet.mechanism, frames, (poses, *driven), place, left_mm)
+        posed = poses, sheet.actuators(command) + zeros, command
+        by_zeros = _by_zeros(sheet.mechanism, frames, posed, place, left_mm)
         notes += _found(sheet, frames, place, (*_precision(frames, poses, left_mm), by_zeros))
     if turned:
         turn = _between(poses, rows.turns(frame, "measured"), rotation)
