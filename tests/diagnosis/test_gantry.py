@@ -75,3 +75,14 @@ def test_a_step_of_a_scale_is_no_noise_on_few_stops(size_mm):
     assert found.verdict["effects"] == "drive_error_function" and found.verdict["leg"] == 1
     assert found.verdict["noise_rms_mm"] == pytest.approx(np.sqrt(3.0) * NOISE_MM, rel=0.3)
     assert "noise stated" not in found.verdict["notes"]
+
+
+def test_a_large_step_of_a_scale_is_no_lead_error_in_addition():
+    """The line that fits a step best has three quarters of its mean square: the function of the drive holds it, too."""
+
+    def joined(way):
+        return way + 0.6 * (way > [800.0, np.inf, np.inf])
+
+    found, *_ = _diagnosed(stops(joined, count=240, seed=3))
+    assert (found.verdict["effects"], found.verdict["leg"]) == ("drive_error_function", 1)
+    assert found.verdict["probability"] > 0.85
