@@ -145,10 +145,12 @@ def diagnose(
     begin(STEPS[4])
     worst = worst_spot(problem.motion.position_mm[problem.at][problem.on_robot], residual[problem.on_robot])
     excluded = left_out(problem, near)
+    numbers = parameter_rows(inference)
     row = _row(inference, verdict, steps, worst, further, (robot.noise_mm, excluded))
+    row |= {"where": where(inference, verdict.effects, numbers)}
     ranked = further.runs.assign(rank=np.arange(1, len(further.runs) + 1))
     tables = {"gap_budget": parts, "gap_next_runs": ranked, "gap_next_poses": further.poses, "gap_left_out": excluded}
-    tables["gap_parameters"] = parameter_rows(inference)
+    tables["gap_parameters"] = numbers
     tables["gap_drive_functions"] = drive_functions(inference, drive_words(robot.mechanism).all_names)
     unexplained = verdict.unexplained and not verdict.no_answer
     tables["gap_remainder"] = remainder_rows(inference) if unexplained else NO_REMAINDER
@@ -198,7 +200,7 @@ def _row(
     further: Advice,
     noise_and_excluded: tuple[float | None, pd.DataFrame],
 ) -> Row:
-    """The row of `gap_verdicts` without the campaign.
+    """The row of `gap_verdicts` without the campaign and the sites.
 
     noise_and_excluded: the stated noise in mm and the rows of `gap_left_out`.
     """
@@ -210,7 +212,7 @@ def _row(
         "unnamed": "+".join(t.effect for t in inference.hypothesis.terms if t.effect not in verdict.effects),
         "probability": verdict.probability,
         "leg": verdict.leg,
-        "where": where(inference, verdict.effects),
+        "where": "",
         "confounded_with": ", ".join(verdict.confounded_with),
         "groups": "; ".join(" | ".join(group.names) for group in verdict.groups),
         "searches_apart": inference.posterior.apart,

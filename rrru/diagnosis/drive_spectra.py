@@ -23,7 +23,7 @@ from scipy.linalg import block_diag, qr
 from scipy.optimize import minimize_scalar
 from scipy.special import gammaln
 
-from rrru.arrays import FloatArray
+from rrru.arrays import BoolArray, FloatArray
 from rrru.diagnosis.aliases import EffectKey
 from rrru.diagnosis.discrepancy_basis import UNKNOWN
 from rrru.diagnosis.options import OPTIONS
@@ -68,8 +68,9 @@ def with_spectra(
             continue
         columns, roots = linear.columns[effect.name, 0].reshape(len(data), -1), effect.coordinates.roots
         of_one = effect.coordinates.of_one
-        best, prior_scale, noise = likeliest(data, _without(columns, basis), (roots, of_one), basis.shape[1])
-        library[effect.name] = _chosen(effect, _visible(columns, roots[best], prior_scale / noise), prior_scale)
+        best, prior_scale, noise, err = likeliest(data, _without(columns, basis), (roots, of_one), basis.shape[1])
+        by_drive = _visible(columns, roots[best], prior_scale / noise)
+        library[effect.name] = _chosen(effect, by_drive, prior_scale, err)
         changed.append((effect.name, 0))
     return replace(problem, library=library), changed
 
@@ -274,14 +275,18 @@ def _visible(columns: FloatArray, by_drive: Sequence[FloatArray], size: float) -
     return result
 
 
-def _chosen(effect: Effect, by_drive: Sequence[FloatArray], prior_scale: float) -> Effect:
-    """An effect of one spectrum, whose coordinates are mixtures (c_k, r_k) by drive of one prior s.d."""
+def _chosen(effect: Effect, by_drive: Sequence[FloatArray], prior_scale: float, err: BoolArray) -> Effect:
+    """An effect of one spectrum, whose coordinates are mixtures (c_k, r_k) by drive of one prior s.d.
+
+    err (K,): the drives that err where the spectrum is likeliest.
+    """
     coordinates = effect.coordinates
     unit = max(np.abs(its).max() for its in by_drive)
     typical = np.full(sum(its.shape[1] for its in by_drive), prior_scale * unit)
     # the prior pays for the choice among several by the data
     log_prior = coordinates.log_prior - np.log(len(coordinates.roots))
-    changes = {"typical": typical, "roots": (), "sized": True, "log_prior": log_prior}
+    sized = tuple(np.unique(coordinates.legs)[err].tolist())
+    changes = {"typical": typical, "roots": (), "sized": sized, "log_prior": log_prior}
     return _mixed(effect, [its / unit for its in by_drive], changes)
 
 
@@ -290,8 +295,8 @@ def likeliest(
     columns: FloatArray,
     spectra: tuple[tuple[tuple[FloatArray, ...], ...], tuple[bool, ...]],
     fitted: int,
-) -> tuple[int, float, float]:
-    """Number of the spectrum of highest likelihood, the factor of its sizes, and the noise, of data (m,).
+) -> tuple[int, float, float, BoolArray]:
+    """The likeliest spectrum of data (m,): its number, the factor of its sizes, the noise, which drives (K,) err.
 
     columns (m, c); spectra: `roots` and `of_one` as of `Coordinates`. All drives together and each one alone are tried,
     whatever is likeliest counts. fitted: number of parameters fitted together with them.
@@ -306,8 +311,10 @@ def likeliest(
         for its in alone if of_one or len(alone) == 1 else (drive >= 0, *alone):
             value, factor, noise = _likeliest_factor(scaled[np.ix_(its, its)], along[its], square, len(data) - fitted)
             # each drive is as probable as another
-            found.append((value - (not its.all()) * np.log(len(by_drive)), number, factor, noise))
-    return max(found)[1:]
+            value -= (not its.all()) * np.log(len(by_drive))
+            found.append((value, number, factor, noise, np.unique(drive[its])))
+    _, number, factor, noise, erring = max(found, key=lambda one: one[:2])
+    return number, factor, noise, np.isin(np.arange(len(spectra[0][number])), erring)
 
 
 def _likeliest_factor(gram: FloatArray, moment: FloatArray, square: float, count: int) -> tuple[float, float, float]:

@@ -12,7 +12,7 @@ from rrru.campaign.outliers import isolated
 from rrru.diagnosis.aliases import EffectKey
 from rrru.diagnosis.calibrate import calibrate, origin
 from rrru.diagnosis.detectability import with_seen
-from rrru.diagnosis.discrepancy_basis import UNKNOWN, Library
+from rrru.diagnosis.discrepancy_basis import UNKNOWN
 from rrru.diagnosis.drive_spectra import with_orders, with_spectra
 from rrru.diagnosis.evidence import ModelEvidence
 from rrru.diagnosis.heldout import HeldOut
@@ -28,7 +28,14 @@ from rrru.diagnosis.terms import EffectTerm, each_leg, shape_probabilities
 from rrru.diagnosis.whitened import DISCREPANCY_SCALES, spectrum
 from rrru.effects.protocol import Coordinates
 from rrru.errors import FitError
-from rrru.estimation.noise_model import MIN_FREE_NUMBERS, alike, fit_noise, high_frequency_noise, p_value
+from rrru.estimation.noise_model import (
+    MIN_FREE_NUMBERS,
+    alike,
+    fit_noise,
+    free_numbers,
+    high_frequency_noise,
+    p_value,
+)
 
 # what the configuration says of the noise
 KNOWN, STATED, UNKNOWN_NOISE = "known", "stated", "unknown"
@@ -131,39 +138,49 @@ def with_noise(
     repeats, complete = noise.repeat_noise(problem.measurements[problem.used]), problem.complete(problem.library)
     if 3 * complete.sum() < linear.base.shape[-1] + MIN_FREE_NUMBERS:
         complete[:] = True
-    columns = _noise_columns(problem, linear, bool(stated_mm) or repeats[1] >= noise.ENOUGH_REPEATS)
+    known = bool(stated_mm) or repeats[1] >= noise.ENOUGH_REPEATS
+    columns, prior_sd = _noise_columns(problem, linear, known)
     # an effect is no noise where its inputs are unknown
     data, columns, series = linear.data[complete], columns[complete], problem.series[complete]
-    model = fit_noise(data, columns, series, stated_mm, repeats, spectrum if problem.along_paths else None)
-    model = replace(model, alike=alike(data, columns, problem.stop[complete], problem.kind[complete]))
+    discrepancy = spectrum if problem.along_paths else None
+    model = fit_noise(data, columns, series, stated_mm, repeats, discrepancy, prior_sd)
+    over_noise = None if prior_sd is None else prior_sd / model.mean_mm
+    stops = alike(data, columns, problem.stop[complete], problem.kind[complete], over_noise)
+    model = replace(model, alike=stops)
     repeated = noise.quieter_repeats(problem.measurements[problem.used], model.mean_mm, model.correlation)
     if repeated is not None:
         return problem.under(model.of_size(repeated)), REPEATS
     return problem.under(model), "fitted"
 
 
-def _noise_columns(problem: DiagnosisProblem, linear: LinearizedProblem, known: bool) -> FloatArray:
-    """Columns (m, 3, k) that may explain the readings while the noise is estimated.
+def _noise_columns(
+    problem: DiagnosisProblem, linear: LinearizedProblem, known: bool
+) -> tuple[FloatArray, FloatArray | None]:
+    """Columns (m, 3, k) that may explain the readings while the noise is estimated, and their prior s.d. (k,).
 
-    All of the library. Where these leave too few numbers: without effects of many coefficients, then each effect in the
-    best shape alone, then without the functions of the discrepancy. known: whether the noise is known otherwise, so
-    that no number needs to be left. Where it is not and the library explains everything, the residuals of the
-    calibration are used.
+    All of the library, with coefficients of which nothing is known: prior_sd is None. Where these leave too few
+    numbers: the coefficients of rough functions, whose spectrum the readings have chosen, with the prior of that
+    spectrum, all others with an infinite s.d. Then without effects of many coefficients, then each effect in the best
+    shape alone, then without the functions of the discrepancy. known: whether the noise is known otherwise, so that no
+    number needs to be left. Where it is not and the library explains everything, the residuals of the calibration are
+    used.
     """
     blocks = {key: columns for key, columns in linear.columns.items() if key[0] in problem.library}
     searched = {key: blocks.pop(key) for key in [*blocks] if _is_searched(problem.library[key[0]].coordinates, key[1])}
-    for chosen in _fewer_blocks(linear, blocks, problem.library):
+    for chosen, prior_sd in _fewer_blocks(problem, linear, blocks):
         columns = np.concatenate([linear.base, *chosen.values(), *linear.shape_columns.values()], axis=-1)
-        if _leaves_enough(linear, columns):
-            return _with_significant(problem, linear, columns, searched)
-    return columns if known else linear.base
+        if _leaves_enough(problem, linear, columns, prior_sd):
+            return _with_significant(problem, linear, (columns, prior_sd), searched)
+    return (columns if known else linear.base), None
 
 
-def _leaves_enough(linear: LinearizedProblem, columns: FloatArray) -> bool:
-    """Whether columns (m, 3, k) leave enough of the numbers for an estimate of the noise."""
-    return bool(
-        linear.data.size - columns.shape[-1] >= max(MIN_FREE_NUMBERS, OPTIONS.min_free_share * linear.data.size)
-    )
+def _leaves_enough(
+    problem: DiagnosisProblem, linear: LinearizedProblem, columns: FloatArray, prior_sd: FloatArray | None = None
+) -> bool:
+    """Whether columns (m, 3, k) leave enough of the numbers for an estimate of the noise; prior_sd (k,), or None."""
+    count = linear.data.size
+    free = count - columns.shape[-1] if prior_sd is None else free_numbers(columns, prior_sd / problem.noise_mm)
+    return bool(free >= max(MIN_FREE_NUMBERS, OPTIONS.min_free_share * count))
 
 
 def _is_searched(coordinates: Coordinates, shape: int) -> bool:
@@ -172,32 +189,56 @@ def _is_searched(coordinates: Coordinates, shape: int) -> bool:
 
 
 def _with_significant(
-    problem: DiagnosisProblem, linear: LinearizedProblem, columns: FloatArray, searched: dict[EffectKey, FloatArray]
-) -> FloatArray:
-    """Columns (m, 3, k), and those of each shape that was searched for that explain more than noise does.
+    problem: DiagnosisProblem,
+    linear: LinearizedProblem,
+    chosen: tuple[FloatArray, FloatArray | None],
+    searched: dict[EffectKey, FloatArray],
+) -> tuple[FloatArray, FloatArray | None]:
+    """Columns (m, 3, k) and their prior s.d., and those of each searched shape that explains more than noise does.
 
     The best of many orders explains more of pure noise than its number of columns: with it the noise would be found
     too low. The F test is at a level that the prior probabilities of the orders share out (weighted Bonferroni:
     Genovese, Roeder and Wasserman, False discovery control with p-value weighting, Biometrika 93, 2006).
     """
+    columns, prior_sd = chosen
     for (name, shape), block in searched.items():
-        together = np.concatenate([columns, block], axis=-1)
+        together, both_sd = np.concatenate([columns, block], axis=-1), prior_sd
+        if prior_sd is not None:
+            both_sd = np.append(prior_sd, np.full(block.shape[-1], np.inf))
+        over_noise = None if prior_sd is None else prior_sd / problem.noise_mm
         level = OPTIONS.max_searched_order_p * shape_probabilities(problem.library[name].coordinates)[shape]
-        if _leaves_enough(linear, together) and p_value(linear.data, columns, block) < level:
-            columns = together
-    return columns
+        enough = _leaves_enough(problem, linear, together, both_sd)
+        if enough and p_value(linear.data, columns, block, over_noise) < level:
+            columns, prior_sd = together, both_sd
+    return columns, prior_sd
 
 
 def _fewer_blocks(
-    linear: LinearizedProblem, blocks: dict[EffectKey, FloatArray], library: Library
-) -> Iterator[dict[EffectKey, FloatArray]]:
-    """Blocks of columns by (effect, shape), in steps fewer of them."""
-    yield blocks
+    problem: DiagnosisProblem, linear: LinearizedProblem, blocks: dict[EffectKey, FloatArray]
+) -> Iterator[tuple[dict[EffectKey, FloatArray], FloatArray | None]]:
+    """Blocks of columns by (effect, shape), in steps less free, and the prior s.d. (k,) of all columns with them.
+
+    None for these where nothing is known of any coefficient.
+    """
+    library = problem.library
+    yield blocks, None
     few = {key: columns for key, columns in blocks.items() if not library[key[0]].coordinates.broad}
-    yield few
     fitting = _best_shapes(linear, few)
-    yield fitting
-    yield {key: columns for key, columns in fitting.items() if key[0] not in UNKNOWN}
+    steps = few, fitting, {key: columns for key, columns in fitting.items() if key[0] not in UNKNOWN}
+    rough, rough_sd = {}, []
+    for key, columns in blocks.items():
+        coordinates = library[key[0]].coordinates
+        if coordinates.sized:
+            err = np.isin(coordinates.legs, coordinates.sized)
+            rough[key] = columns[..., err]
+            rough_sd.append(coordinates.typical[err])
+    for step in steps if rough else ():
+        free = [columns.shape[-1] for columns in (linear.base, *step.values())]
+        after = sum(columns.shape[-1] for columns in linear.shape_columns.values())
+        sd = np.concatenate([np.full(sum(free), np.inf), *rough_sd, np.full(after, np.inf)])
+        yield step | rough, sd
+    for step in steps:
+        yield step, None
 
 
 def _best_shapes(linear: LinearizedProblem, blocks: dict[EffectKey, FloatArray]) -> dict[EffectKey, FloatArray]:

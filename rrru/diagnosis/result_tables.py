@@ -5,11 +5,11 @@ from itertools import zip_longest
 
 import numpy as np
 import pandas as pd
-from scipy.special import stdtrit
+from scipy.special import ndtri, stdtrit
 
 from rrru.arrays import BoolArray, FloatArray
 from rrru.campaign import measurements as rows
-from rrru.diagnosis.aliases import ObjectArray, Row
+from rrru.diagnosis.aliases import Facts, ObjectArray, Row
 from rrru.diagnosis.detectability import detectability
 from rrru.diagnosis.discrepancy_basis import Library
 from rrru.diagnosis.inference import InferenceResult
@@ -21,6 +21,7 @@ from rrru.diagnosis.shrink import ShrinkStep, shrink_table
 from rrru.diagnosis.terms import EffectTerm, per_leg, sites, spread
 from rrru.diagnosis.variance_by_factor import drive_errors, variance_by_factor
 from rrru.diagnosis.verdict import NOT_TESTED, Verdict, label
+from rrru.effects.harmonic import is_phase
 from rrru.effects.protocol import Effect
 from rrru.estimation.intervals import QUANTILE_95
 from rrru.robots.drive_words import DriveWords, drive_words
@@ -90,14 +91,58 @@ def _attribute_rows(inference: InferenceResult, verdict: Verdict) -> pd.DataFram
     return rows
 
 
-def where(inference: InferenceResult, effects: Collection[str]) -> str:
-    """Where the effects of a verdict act: of each its site in words, or the first and the last of several."""
-    problem, found = inference.problem, []
+def where(inference: InferenceResult, effects: Collection[str], numbers: pd.DataFrame) -> str:
+    """Where the effects of a verdict act: of each its sites in words, several in a row by the first and the last.
+
+    Of an effect of several legs the sites of those at which it is not zero, see `acting_places`. numbers: rows of
+    `gap_parameters`.
+    """
+    problem, words = inference.problem, drive_words(inference.problem.mechanism)
+    found: list[str] = []
     for term in inference.hypothesis.terms:
-        if term.effect in effects:
-            names = sites(problem.library, problem.motion, term)
-            found.append(names[0] if len(names) == 1 else f"{names[0]} to {names[-1]}")
+        if term.effect not in effects:
+            continue
+        names, acting = sites(problem.library, problem.motion, term), None
+        if per_leg(problem.library[term.effect]):
+            places = acting_places(numbers[numbers["effect"] == term.effect].to_dict("records"))
+            legs = np.unique(problem.library[term.effect].coordinates.legs).tolist()
+            acting = sites(problem.library, problem.motion, term, [leg for leg in legs if words.place(leg) in places])
+        found += _ranges(names, acting or names)
     return ", ".join(dict.fromkeys(found))
+
+
+def _ranges(names: Sequence[str], chosen: Collection[str]) -> list[str]:
+    """Chosen ones of some names in their order, those in a row as "first to last"."""
+    result: list[list[str]] = []
+    for last, name in zip(("", *names), names, strict=False):
+        if name in chosen:
+            if last in chosen:
+                result[-1].append(name)
+            else:
+                result.append([name])
+    return [run[0] if len(run) == 1 else f"{run[0]} to {run[-1]}" for run in result]
+
+
+def acting_places(numbers: Sequence[Facts]) -> list[str]:
+    """Places of an effect at which one of its numbers is not zero by its 95 % interval; all where there is none.
+
+    numbers: its rows of `gap_parameters`. Of n numbers of one place each has an interval of 1 - 0.05 / n (Bonferroni),
+    so that chance alone names one place in twenty. The phase of a wave says nothing: no amplitude has the phase zero.
+    """
+    by_place: dict[str, list[Facts]] = {}
+    for number in numbers:
+        if number["place"] and not is_phase(number["parameter"]):
+            by_place.setdefault(number["place"], []).append(number)
+    return [place for place, its in by_place.items() if any(_is_not_zero(one, len(its)) for one in its)] or [*by_place]
+
+
+def _is_not_zero(number: Facts, count: int) -> bool:
+    """Whether the interval of one of so many numbers, a row of `gap_parameters`, does not hold zero."""
+    value, low, high = (number[key] for key in ("value", "low_95", "high_95"))
+    wider = float(ndtri(1.0 - 0.025 / count)) / QUANTILE_95
+    # an interval that begins at zero, the bound of a size, stays there
+    above = low > 0.0 and value - wider * (value - low) > 0.0
+    return bool(above or (high < 0.0 and value + wider * (high - value) < 0.0))
 
 
 def _effect_row(inference: InferenceResult, name: str) -> Row:

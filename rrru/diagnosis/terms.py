@@ -1,6 +1,6 @@
 """The hypotheses of the diagnosis: sets of terms, a term being one effect in one shape on certain legs."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -80,10 +80,12 @@ def signatures(library: Library, linear: LinearizedProblem, terms: Sequence[Effe
     return [c if t.legs == EACH else c @ spread(library[t.effect].coordinates, t.legs) for c, t in pairs]
 
 
-def sites(library: Library, motion: Motion, term: EffectTerm) -> list[str]:
-    """Names of the robot's sites at which a term acts along a motion."""
+def sites(library: Library, motion: Motion, term: EffectTerm, legs: Collection[int] | None = None) -> list[str]:
+    """Names of the robot's sites at which a term acts along a motion; legs: it acts on these only, None for all."""
     effect = library[term.effect]
     sizes = effect.coordinates.typical * spread(effect.coordinates, term.legs).sum(axis=1)
+    if legs is not None:
+        sizes = np.where(np.isin(effect.coordinates.legs, [*legs]), sizes, 0.0)
     values = effect.coordinates.to_values(sizes, effect.coordinates.shapes[term.shape])
     active = active_sites(np.nan_to_num(effect.contribute(motion, values).twists))
     return [name for name, acts in zip(motion.robot.legs.sites, active, strict=True) if acts]

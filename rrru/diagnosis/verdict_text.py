@@ -18,6 +18,7 @@ from rrru.diagnosis.result_notes import (
     REPEATABILITY_UNSURE,
     ROBOT_REPEATS,
 )
+from rrru.diagnosis.result_tables import acting_places
 from rrru.diagnosis.verdict import NOT_TESTED, POSSIBLE
 from rrru.effects.causes import cause_texts
 from rrru.effects.protocol import is_per_load
@@ -222,12 +223,8 @@ def _effect(
 
 
 def _places(numbers: Sequence[Facts]) -> str:
-    """Where an effect acts whose parameters, rows of `gap_parameters`, each belong to one of several legs or drives.
-
-    A place counts only if one of its parameters is not zero by its 95 % interval; all do where none has such a one.
-    """
-    numbers = [one for one in numbers if one["low_95"] > 0.0 or one["high_95"] < 0.0] or numbers
-    places = [place.partition(" ") for place in dict.fromkeys(number["place"] for number in numbers) if place]
+    """Where an effect acts whose parameters, rows of `gap_parameters`, each belong to one of several legs or drives."""
+    places = [place.partition(" ") for place in acting_places(numbers)]
     return f"{places[0][0]} {', '.join(name for _, _, name in places)}" if places else ""
 
 

@@ -268,6 +268,15 @@ CAUSES = {
         "Multiply the lead in the controller by 1 + the share found, or divide the steps per millimetre by it.",
         "ISO 230-2; ISO 3408-3 (travel deviation of ball screws)",
     ),
+    "gain_error": Cause(
+        "a joint turns by a constant share more or less than commanded",
+        "Turn the joint through its whole range and compare its angle with an angle gauge, or with the instrument on a "
+        "target that turns with it. Look up gear ratio, counts per turn and gain of the sensor in the controller; "
+        "measure the diameters of drums and pulleys.",
+        "Divide the gear ratio, or the counts per turn of the joint, in the controller by 1 + the share found, or "
+        "divide the commands by it.",
+        "Hollerbach, Khalil and Gautier, Springer Handbook of Robotics, 2016 (model identification)",
+    ),
     "bar_mismatch": Cause(
         "the two bars of one arm differ in length",
         "Measure all bars between their ball centres on one fixture with two pins.",

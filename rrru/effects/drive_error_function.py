@@ -39,8 +39,10 @@ ORDERS = np.arange(1, 129)
 # by the kind of a function its falling off with order / bend, its bends in waves per turn, its highest order, and
 # whether it is a fault of one drive
 _SPECTRA: tuple[tuple[Callable[[FloatArray], FloatArray], tuple[float, ...], int, bool], ...] = (
-    # with steps, which high orders make: ASSUME no robot has several scales that are joined with an offset
-    (lambda at: (1.0 + at**2) ** -0.5, (3.0, 12.0, 48.0), 128, True),
+    # with steps, which high orders make: ASSUME no robot has several scales that are joined with an offset. The waves
+    # of a step fall off from the first one on, as with a bend of one wave per turn: higher bends leave so little of its
+    # longest waves that an effect that resembles these, as a lead error does, seems to act as well
+    (lambda at: (1.0 + at**2) ** -0.5, (1.0, 3.0, 12.0, 48.0), 128, True),
     # with corners
     (lambda at: (1.0 + at**4) ** -0.5, (3.0, 6.0, 12.0, 24.0, 48.0), 64, False),
     # smooth, of a short part of a turn: fewer waves are what eccentricity, gears and others make

@@ -12,6 +12,17 @@ from rrru.effects.protocol import Contribution, Coordinates, Effect, Motion, leg
 from rrru.kinematics.robot import Robot
 from rrru.parameters import Parameter, ParameterSet
 
+_PHASE = "phase"
+
+
+def is_phase(parameter: str) -> bool:
+    """Whether a parameter of an effect is the phase of a wave, by its name.
+
+    >>> is_phase("phase2"), is_phase("amplitude2")
+    (True, False)
+    """
+    return parameter.rstrip("0123456789") == _PHASE
+
 
 def drives_of(robot: Robot, unit: str) -> IntArray:
     """Numbers (k,) from 0 on of a robot's drives of a unit, "rad" or "mm"."""
@@ -24,7 +35,7 @@ def harmonic_parameters(
     """Amplitudes in the unit and phases in rad of drives (k,), numbered from 0 on, as a tuple of 2 k parameters."""
     count = drives.max() + 1
     amplitudes = leg_parameters(source, ("amplitude", unit, 0.0, highest), count=count)
-    phases = leg_parameters("free", ("phase", "rad", -np.pi, np.pi), count=count)
+    phases = leg_parameters("free", (_PHASE, "rad", -np.pi, np.pi), count=count)
     return tuple(parameter for parameter in (*amplitudes, *phases) if parameter.leg - 1 in drives)
 
 

@@ -17,7 +17,7 @@ Source: ISO 230-2, mean bidirectional positional deviation; ISO 3408-3, travel d
 
 import numpy as np
 
-from rrru.arrays import FloatArray
+from rrru.arrays import FloatArray, IntArray
 from rrru.effects.harmonic import drives_of
 from rrru.effects.protocol import Contribution, Effect, Motion, leg_parameters, plain_coordinates
 from rrru.kinematics.robot import Robot
@@ -29,15 +29,22 @@ _TYPICAL, _MOST, _SOURCE = 2e-4, 1e-2, "ISO 3408-3, grades 5 to 10: 8e-5 to 7e-4
 def for_robot(robot: Robot) -> Effect | None:
     """The effect of all drives that slide, None where none does."""
     sliding = drives_of(robot, "mm")
-    if not len(sliding):
-        return None
-    every = leg_parameters(_SOURCE, ("lead_error", "1", -_MOST, _MOST), count=int(sliding.max()) + 1)
-    parameters = ParameterSet(tuple(parameter for parameter in every if parameter.leg - 1 in sliding))
+    return proportional("lead_error", sliding, (_TYPICAL, _MOST, _SOURCE)) if len(sliding) else None
+
+
+def proportional(name: str, drives: IntArray, size: tuple[float, float, str]) -> Effect:
+    """The effect of a name by which drives (k,), numbered from 0 on, go a constant share of their values too far.
+
+    size: typical and largest share, and their source.
+    """
+    typical, most, source = size
+    every = leg_parameters(source, (name, "1", -most, most), count=int(drives.max()) + 1)
+    parameters = ParameterSet(tuple(parameter for parameter in every if parameter.leg - 1 in drives))
 
     def scaled(motion: Motion, values: FloatArray) -> Contribution:
-        """Changes of the actuator values under shares (k,) of the slides."""
+        """Changes of the actuator values under shares (k,) of the drives."""
         change = np.zeros(motion.drive.shape)
-        change[:, sliding] = values * motion.drive[:, sliding]
+        change[:, drives] = values * motion.drive[:, drives]
         return motion.at_drives(change)
 
-    return Effect("lead_error", parameters, plain_coordinates(parameters, _TYPICAL), scaled, of_drive_value=True)
+    return Effect(name, parameters, plain_coordinates(parameters, typical), scaled, of_drive_value=True)

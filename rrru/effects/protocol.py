@@ -195,8 +195,8 @@ class Coordinates:
     coordinates are so many that they are marginalised before the other effects are fitted; spectra: prior s.d. (c,) of
     the coordinates, among which the campaign chooses; of_one: by spectrum, whether only one drive has it; roots: the
     same of coordinates that a campaign resolves, by spectrum and drive (c_k, r_k): root @ root.T is the prior
-    covariance; sized: whether it has chosen, and `typical` is its choice; log_prior: log prior probability of a choice
-    that was made outside of the fit.
+    covariance; sized: where it has chosen, and `typical` is its choice, the legs that err in this choice; log_prior:
+    log prior probability of a choice that was made outside of the fit.
     """
 
     typical: FloatArray
@@ -214,7 +214,7 @@ class Coordinates:
     spectra: tuple[FloatArray, ...] = ()
     of_one: tuple[bool, ...] = ()
     roots: tuple[tuple[FloatArray, ...], ...] = ()
-    sized: bool = False
+    sized: tuple[int, ...] = ()
     log_prior: float = 0.0
 
     def __len__(self) -> int:

@@ -58,6 +58,8 @@ _NO_OFFSET = 0.05
 # must not widen every interval
 _NONE = 0.5
 _ROUNDS, _LEAST_LEFT, _RANK = 4, 0.02, 1e-9
+# how much coefficients with a prior explain depends on the noise: it is found in more rounds
+_ROUNDS_OF_PRIORS = 20
 # with more columns than this the rank comes from their squares, to fewer digits
 _MANY, _RANK_OF_SQUARES = 400, 1e-12
 # rows of these that are taken at a time
@@ -182,8 +184,14 @@ def fit_noise(
     stated_mm: float | None = None,
     repeats: tuple[float, int] | None = None,
     discrepancy: Callable[[FloatArray], FloatArray] | None = None,
+    prior_sd: FloatArray | None = None,
 ) -> NoiseModel:
     """NoiseModel of data (m, 3) after columns (m, 3, k) are projected out; series (m,).
+
+    prior_sd (k,): prior standard deviations of the columns' coefficients, infinite for those of which nothing is known,
+    None for all of them. A coefficient with a prior is a random effect: the residuals are those about its posterior
+    mean, and it takes as many degrees of freedom from them as the readings determine it (Harville, Maximum likelihood
+    approaches to variance component estimation, Journal of the American Statistical Association 72, 1977).
 
     stated_mm: stated s.d. per axis, None where none is; repeats: s.d. per axis of poses that were measured several
     times and its degrees of freedom, which count where the columns leave few degrees of freedom, None for none;
@@ -193,10 +201,10 @@ def fit_noise(
     together, wave = along_runs(np.concatenate([columns, data[..., None]], axis=-1), series)
     length, model, instrument_mm = lengths(series), NoiseModel.white(stated_mm or 1.0), stated_mm
     smooth = np.zeros((len(wave), 1)) if discrepancy is None else discrepancy(wave)[:, None]
-    for _ in range(_ROUNDS):
+    for _ in range(_ROUNDS if prior_sd is None else _ROUNDS_OF_PRIORS):
         variance = model.variance(wave, length) + (model.discrepancy * model.mean_mm) ** 2 * smooth
         white = (together / np.sqrt(variance)[..., None]).reshape(-1, together.shape[-1])
-        left, share = _left(white[:, -1], white[:, :-1])
+        left, share = _left(white[:, -1], white[:, :-1], prior_sd)
         seen = _Seen(variance * left.reshape(-1, 3) ** 2, share.reshape(-1, 3), wave, length, smooth)
         known = [(stated_mm**2, _STATED)] if stated_mm else []
         if repeats and repeats[1] and seen.free < MIN_FREE_NUMBERS:
@@ -235,19 +243,18 @@ def high_frequency_noise(
     return seen.rough(chosen)
 
 
-def p_value(data: FloatArray, columns: FloatArray, block: FloatArray) -> float:
+def p_value(data: FloatArray, columns: FloatArray, block: FloatArray, prior_sd: FloatArray | None = None) -> float:
     """The p value of the F test of a block (m, 3, c) in addition to columns (m, 3, k), of data (m, 3) of equal noises.
 
-    1 where the columns hold the block; see `rrru.estimation.f_test`.
+    1 where the columns hold the block; see `rrru.estimation.f_test`. prior_sd (k,): as for `fit_noise`, over the noise.
     """
-    flat = np.concatenate([columns, block, data[..., None]], axis=-1).reshape(data.size, -1)
-    # a triangle has the sums of squares and the ranks of the columns that it is of
-    triangle = qr(flat / np.maximum(np.linalg.norm(flat, axis=0), 1e-300), mode="r", check_finite=False)[0]
-    triangle = triangle[: triangle.shape[1]]
-    both, alone = (_left(triangle[:, -1], triangle[:, :count]) for count in (-1, columns.shape[-1]))
-    (left, share), (without, its_share) = both, alone
-    freedom = data.size - round(float((1.0 - share).sum()))
-    rank = round(float((its_share - share).sum()))
+    flat, count = np.concatenate([columns, block, data[..., None]], axis=-1).reshape(data.size, -1), columns.shape[-1]
+    # the triangle of all columns has their sums of squares, and their ranks
+    triangle = qr(flat, mode="r", check_finite=False)[0][: flat.shape[1]]
+    both_sd = None if prior_sd is None else np.concatenate([prior_sd, np.full(block.shape[-1], np.inf)])
+    left, share = _left(triangle[:, -1], triangle[:, :-1], both_sd)
+    without, its_share = _left(triangle[:, -1], triangle[:, :count], prior_sd)
+    freedom, rank = data.size - round(float((1.0 - share).sum())), round(float((its_share - share).sum()))
     if rank < 1 or freedom < 1:
         return 1.0
     unexplained = float(left @ left)
@@ -255,17 +262,30 @@ def p_value(data: FloatArray, columns: FloatArray, block: FloatArray) -> float:
     return float(fdtrc(rank, freedom, max(ratio, 0.0)))
 
 
-def alike(data: FloatArray, columns: FloatArray, stop: npt.NDArray[np.int_], kind: npt.NDArray[np.int_]) -> float:
+def free_numbers(columns: FloatArray, prior_sd: FloatArray | None = None) -> float:
+    """Degrees of freedom that columns (m, 3, k) leave; prior_sd (k,): as for `fit_noise`, over the noise."""
+    flat = columns.reshape(-1, columns.shape[-1])
+    return float(_left(np.zeros(len(flat)), flat, prior_sd)[1].sum())
+
+
+def alike(
+    data: FloatArray,
+    columns: FloatArray,
+    stop: npt.NDArray[np.int_],
+    kind: npt.NDArray[np.int_],
+    prior_sd: FloatArray | None = None,
+) -> float:
     """Design effect of several readings at one stop: 1 + (t - 1) r, t readings at a stop, of correlation r.
 
     data (m, 3), of which columns (m, 3, k) are projected out; stop (m,): of each row; kind (m,): of reading, odd for
-    orientations, which do not count. Source: Kish, Survey Sampling, 1965, section 5.4 (design effect).
+    orientations, which do not count; prior_sd (k,): as for `fit_noise`, over the noise. Source: Kish, Survey Sampling,
+    1965, section 5.4 (design effect).
     """
     counted = kind % 2 == 0
     count = np.bincount(stop[counted], minlength=stop.max() + 1).astype(float)
     if count.max() < 2.0:
         return 1.0
-    left, _ = _left(data.ravel(), columns.reshape(data.size, -1))
+    left, _ = _left(data.ravel(), columns.reshape(data.size, -1), prior_sd)
     left = left.reshape(-1, 3)
     size = np.sqrt(np.bincount(kind, (left**2).sum(axis=1)) / np.maximum(np.bincount(kind), 1))
     unit = left[counted] / np.maximum(size, 1e-300)[kind[counted], None]
@@ -297,10 +317,20 @@ def _spectrum(correlation: float, count: int) -> FloatArray:
     return np.diag(dct(dct(covariance, axis=0, norm="ortho"), axis=1, norm="ortho")).copy()
 
 
-def _left(data: FloatArray, columns: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Data (n,) projected off columns (n, k), and the share (n,) of each row's variance that remains."""
+def _left(data: FloatArray, columns: FloatArray, prior_sd: FloatArray | None = None) -> tuple[FloatArray, FloatArray]:
+    """Data (n,) projected off columns (n, k), and the share (n,) of each row's variance that remains.
+
+    prior_sd (k,): of the columns' coefficients in data of unit noise, None where nothing is known of any. With B the
+    columns and D the prior precisions the data lose B (B^T B + D)^-1 B^T of themselves.
+    """
     if not columns.size:
         return data, np.ones(len(data))
+    if prior_sd is not None and np.isfinite(prior_sd).any():
+        # a prior is a reading of its coefficient
+        count = len(data)
+        readings = np.diag(1.0 / prior_sd)[np.isfinite(prior_sd)]
+        left, share = _left(np.append(data, np.zeros(len(readings))), np.concatenate([columns, readings]))
+        return left[:count], share[:count]
     size = np.linalg.norm(columns, axis=0)
     unit = columns / np.where(size > 0.0, size, 1.0)
     if columns.shape[1] > _MANY:

@@ -96,6 +96,19 @@ def campaign(backlash_mm=(0.0, 0.0, 0.0), grown=lambda way, time: 0.0, seed=1):
     return pd.concat(tables, ignore_index=True).assign(speed_mm_s=np.nan, payload_kg=np.nan, status="ok")
 
 
+def stops(erring, count=70, seed=1):
+    """A table of so many stops at random; erring: from values (n, 3) of the slides to those where they stand."""
+    generator = np.random.default_rng(seed)
+    way = RANGES_MM[:, 0] + np.ptp(RANGES_MM, axis=1) * generator.uniform(0.05, 0.95, (count, 3))
+    seen = erring(way) @ _AXES + NOISE_MM * generator.standard_normal((count, 3))
+    numbers = {"trajectory": "stops", "run": 1, "point": np.arange(1, count + 1), "time_s": np.nan}
+    drives = dict(zip(GANTRY.parts.columns, way.T, strict=True))
+    positions = rows.vector_columns("command", GANTRY.forward(way))
+    positions |= rows.vector_columns("measured", _as_measured(seen))
+    table = pd.DataFrame(numbers | positions | drives)
+    return table.assign(speed_mm_s=np.nan, payload_kg=np.nan, status="ok")
+
+
 def _as_measured(seen):
     """Positions (n, 3) in the frame of an instrument that stands almost where the robot's does."""
     return Rotation.from_rotvec([1e-3, -2e-3, 5e-4]).apply(seen) + np.array([0.4, -0.3, -200.2])

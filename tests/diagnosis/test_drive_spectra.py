@@ -149,14 +149,16 @@ def test_the_spectrum_that_made_the_data_is_the_likeliest():
             prior_scale = generator.uniform(0.7, 2.0)
             data = columns @ (prior_scale * size * generator.standard_normal(len(size)))
             data = data + NOISE_MM * generator.standard_normal(len(data))
-            found, factor, noise = likeliest(data - basis @ (basis.T @ data), columns, (roots, several), basis.shape[1])
+            found, factor, noise, _ = likeliest(
+                data - basis @ (basis.T @ data), columns, (roots, several), basis.shape[1]
+            )
             assert noise == pytest.approx(NOISE_MM, rel=0.1)
             power, true = (factor * spectra[found]) ** 2, (prior_scale * size) ** 2
             shows = true * (columns**2).sum(axis=0) > 3.0 * NOISE_MM**2
             assert power[shows].sum() == pytest.approx(true[shows].sum(), rel=0.75)
             assert found != number or factor == pytest.approx(prior_scale, rel=0.3)
             hits, draws = hits + (found == number), draws + 1
-    assert draws == 40 and hits >= 28
+    assert draws == 44 and hits >= 30
 
 
 def test_one_drive_alone_has_the_size_that_it_has():
@@ -172,7 +174,7 @@ def test_one_drive_alone_has_the_size_that_it_has():
         root = roots[4][2]
         of_drive = columns[:, found.coordinates.legs == 3] @ (3.0 * root @ generator.standard_normal(root.shape[1]))
         data = of_drive + NOISE_MM * generator.standard_normal(len(of_drive))
-        _, factor, _ = likeliest(
+        _, factor, _, _ = likeliest(
             data - basis @ (basis.T @ data), columns - basis @ (basis.T @ columns), spectra, basis.shape[1]
         )
         factors.append(factor)

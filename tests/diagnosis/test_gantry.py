@@ -6,7 +6,7 @@ import pytest
 from rrru.diagnosis.diagnose import MeasuredRobot, diagnose
 from rrru.diagnosis.settings import GapSettings
 from rrru.kinematics.dynamics import Masses
-from tests.diagnosis.gantry import GANTRY, NOISE_MM, campaign
+from tests.diagnosis.gantry import GANTRY, NOISE_MM, campaign, stops
 
 
 def _diagnosed(frame, without=()):
@@ -62,3 +62,27 @@ def test_rivals_that_need_times_are_separated_by_poses_that_have_times():
     way = np.linalg.norm(frame[[f"command_{axis}_mm" for axis in "xyz"]].diff(), axis=1)[same]
     expected = np.median(way / frame["time_s"].diff().to_numpy()[same])
     np.testing.assert_allclose(listed["speed_mm_s"], expected)
+
+
+@pytest.mark.parametrize("size_mm", [0.1, 0.2])
+def test_a_step_of_a_scale_is_no_noise_on_few_stops(size_mm):
+    """The functions of all slides have more coefficients than there are readings, and stay in the search for noise."""
+
+    def joined(way):
+        return way + size_mm * (way > [600.0, np.inf, np.inf])
+
+    found, *_ = _diagnosed(stops(joined))
+    assert found.verdict["effects"] == "drive_error_function" and found.verdict["leg"] == 1
+    assert found.verdict["noise_rms_mm"] == pytest.approx(np.sqrt(3.0) * NOISE_MM, rel=0.3)
+    assert "noise stated" not in found.verdict["notes"]
+
+
+def test_a_large_step_of_a_scale_is_no_lead_error_in_addition():
+    """The line that fits a step best has three quarters of its mean square: the function of the drive holds it, too."""
+
+    def joined(way):
+        return way + 0.6 * (way > [800.0, np.inf, np.inf])
+
+    found, *_ = _diagnosed(stops(joined, count=240, seed=3))
+    assert (found.verdict["effects"], found.verdict["leg"]) == ("drive_error_function", 1)
+    assert found.verdict["probability"] > 0.85

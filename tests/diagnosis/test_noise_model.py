@@ -55,6 +55,20 @@ def _columns(generator, count=60):
     return np.einsum("crak,kp->rpac", weights, wave).reshape(len(_SERIES), 3, count)
 
 
+def test_random_effects_of_more_coefficients_than_readings_are_no_noise():
+    """Their variances are known: over 40 draws the noise is right on average, and unknown only to its own chance."""
+    generator, count = np.random.default_rng(4), 50
+    prior_sd = 0.3 / (1.0 + np.arange(200.0)) ** 0.5
+    series, found, without = np.zeros(count, dtype=int), [], []
+    for _ in range(40):
+        columns = generator.standard_normal((count, 3, 200))
+        data = columns @ (prior_sd * generator.standard_normal(200)) + 0.5 * generator.standard_normal((count, 3))
+        found.append(fit_noise(data, columns, series, prior_sd=prior_sd).mean_mm)
+        without.append(fit_noise(data, columns[..., :50], series).mean_mm)
+    assert np.mean(found) == pytest.approx(0.5, rel=0.05) and np.std(found) < 0.1
+    assert np.mean(without) > 0.55
+
+
 @pytest.mark.parametrize("stated", [NOISE_MM, None])
 @pytest.mark.parametrize(
     ("axis_mm", "correlation"),

@@ -1,10 +1,13 @@
 """Tables behind a verdict."""
 
-from rrru.diagnosis.result_tables import places_of
+from rrru.diagnosis.diagnose import MeasuredRobot, diagnose
+from rrru.diagnosis.result_tables import acting_places, places_of
+from rrru.diagnosis.settings import GapSettings
 from rrru.effects.library import library
 from rrru.pipeline.read_config import read_config
 from rrru.robots.catalogue import make_mechanism
 from rrru.robots.drive_words import drive_words
+from tests.diagnosis.campaigns import MASSES, NOISE_MM, ROBOT, active, measure
 
 
 def test_a_parameter_is_placed_at_the_leg_that_its_name_counts_and_a_shared_one_nowhere():
@@ -15,3 +18,30 @@ def test_a_parameter_is_placed_at_the_leg_that_its_name_counts_and_a_shared_one_
                 assert place == f"in leg {parameter[-1]}" or name == "drive_error_function", (name, parameter)
     growth = library(robot)["thermal_growth"]
     assert places_of(growth, drive_words(robot)) == ["", ""]
+
+
+def _number(parameter, place, value, error):
+    """A row of `gap_parameters` with an interval of two standard errors."""
+    ends = {"low_95": value - 1.96 * error, "high_95": value + 1.96 * error}
+    return {"parameter": parameter, "place": place, "value": value, **ends}
+
+
+def test_a_cause_acts_at_the_places_at_which_one_of_its_numbers_is_not_zero():
+    phases = [_number(f"phase{k}", f"at joint {k}", 2.0, 0.6) for k in (1, 2)]
+    waves = [_number("amplitude1", "at joint 1", 1e-3, 1e-4), _number("amplitude2", "at joint 2", 1e-4, 1e-4)]
+    assert acting_places([*waves, *phases]) == ["at joint 1"]
+    # one of many numbers is beyond its interval by chance
+    many = [_number(f"sine1_{k}", "at joint 1", 2.5 * (k == 3), 1.0) for k in range(20)]
+    few = [_number("sine2_1", "at joint 2", 2.5, 1.0)]
+    assert acting_places([*many, *few]) == ["at joint 2"]
+    # all where none is beyond
+    assert acting_places(many) == ["at joint 1"]
+
+
+def test_the_table_names_the_sites_at_which_an_effect_is_not_zero():
+    """Backlash of the legs 1 and 3, and none of leg 2."""
+    frame = measure([active("backlash", (8e-4, 0.0, 8e-4))])
+    known = MeasuredRobot(ROBOT, MASSES, NOISE_MM)
+    found = diagnose(frame, known, GapSettings(("backlash",), draws=10), details=False)
+    assert found.verdict["effects"] == "backlash" and found.verdict["leg"] == 0
+    assert found.verdict["where"] == "leg 1 drive, leg 3 drive"

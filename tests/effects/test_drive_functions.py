@@ -207,9 +207,9 @@ def test_every_spectrum_falls_with_the_order_alike_for_all_drives():
         assert (sizes == sizes[:1, :, :1]).all() and (np.diff(sizes[0, :, 0]) <= 0.0).all()
         # slope in logarithms from order 32 to 64
         falling.append(np.log2(sizes[0, 31, 0] / sizes[0, 63, 0]))
-    steps, corners, smooth = np.split(falling, [3, 8])
+    steps, corners, smooth = np.split(falling, [4, 9])
     for kind in (steps, corners, smooth):
         # the larger the bend, the later it falls
         assert (np.diff(kind) < 0.0).all()
     assert 0.9 < steps[0] < 1.0 < 1.9 < corners[0] < 2.0 < 10.0 < smooth[0]
-    assert [one[-1] > 0.0 for one in _law(FUNCTION).coordinates.spectra] == [True] * 3 + [False] * 7
+    assert [one[-1] > 0.0 for one in _law(FUNCTION).coordinates.spectra] == [True] * 4 + [False] * 7

@@ -21,6 +21,7 @@ from rrru.campaign.ingest.zero_offsets import LARGE, LOST, found_zeros
 from rrru.campaign.target_registration import axes_by_turning
 from rrru.kinematics.chain import Poses
 from rrru.kinematics.readings import Readings
+from rrru.kinematics.robot import Robot
 
 # the name of a reflector where the file has no such column
 _UNNAMED = "tool"
@@ -33,8 +34,8 @@ _AS_GOOD, _FAR_BETTER = 2.0, 0.5
 _GROSS_SHARE = 0.01
 # cosine from which on an axis is one of the body's
 _ALONG = 0.9999
-# poses at which a zero offset moves the platform alike, and the share of the move that may differ by rounding
-_SOME_POSES, _ALIKE = 6, 1e-6
+# readings of each reflector at which zero offsets move it, and the share of the move that may differ by rounding
+_SOME_READINGS, _ALIKE = 30, 1e-6
 # rows from which lost zero offsets are estimated; the calibration fits the result to all of them
 _MAX_ROWS = 200
 # ASSUME no platform is off by more than this where the file's frame is the robot's
@@ -108,7 +109,8 @@ def mounting(sheet: Sheet) -> Mounting | None:
         place = place + np.asarray(sheet.mechanism.tool_mm) - np.unique(place, axis=0).mean(axis=0)
     turn = np.eye(3)
     if named and not set(frames.names) <= set(sheet.spec.targets):
-        by_zeros = [] if (frames.known & frames.framing).any() else _by_zeros(sheet, poses, command)
+        posed = poses, sheet.actuators(command) + zeros, command
+        by_zeros = _by_zeros(sheet.mechanism, frames, posed, place, left_mm)
         notes += _found(sheet, frames, place, (*_precision(frames, poses, left_mm), by_zeros))
     if turned:
         turn = _between(poses, rows.turns(frame, "measured"), rotation)
@@ -278,7 +280,7 @@ def _known(sheet: Sheet, names: np.ndarray) -> np.ndarray:
 
 
 def _found(
-    sheet: Sheet, frames: Frames, place: np.ndarray, precision: tuple[np.ndarray, np.ndarray, list[np.ndarray]]
+    sheet: Sheet, frames: Frames, place: np.ndarray, precision: tuple[np.ndarray, np.ndarray, dict[str, np.ndarray]]
 ) -> tuple[str, ...]:
     """Notes on the places (n, 3) that were found; precision: of `_precision`, and of `_by_zeros`."""
     (axes, errors, by_zeros), result = precision, []
@@ -293,7 +295,7 @@ def _found(
             result.append(f"{at}: a platform that never turns does not determine it")
         else:
             known = np.isfinite(errors)
-            moves = [axes[:, known].T @ own @ np.append(place[k], 1.0) for own in by_zeros]
+            moves = by_zeros[name] @ axes[:, known]
             about = float(np.linalg.norm([errors[known].max(), *np.ravel(moves)]))
             result.append(f"reflector {name} found {_place_text(place[k], axes[:, ~known].T, about)}")
     return tuple(result)
@@ -312,25 +314,52 @@ def _precision(frames: Frames, poses: Poses, residual: float) -> tuple[np.ndarra
         return axes, np.where(turned > 0.0, residual / turned, np.inf)
 
 
-def _by_zeros(sheet: Sheet, poses: Poses, command: np.ndarray) -> list[np.ndarray]:
-    """Matrices (3, 4) from places (x, y, z, 1) to what an ordinary zero offset moves them by, of drives that allow it.
+def _by_zeros(
+    robot: Robot, frames: Frames, posed: tuple[Poses, np.ndarray, np.ndarray], place: np.ndarray, left_mm: float
+) -> dict[str, np.ndarray]:
+    """What ordinary zero offsets of the K drives move the found place of each reflector by, (K, 3) in mm, by its name.
 
-    A zero offset of the last drive of a chain moves the platform alike in all poses. No reading tells it from the
-    reflectors' places.
+    The places, and the frame where it is registered, take over a part of what a zero offset moves the reflectors by:
+    its least squares fit. What is left of all zero offsets makes the residual, which shows how large they are, if they
+    are alike. Of the last drive of a chain nothing is left, as it moves the platform alike in all poses: no reading
+    tells its zero from the reflectors' places.
+
+    posed: Poses (n), actuator values (n, K) and nominal positions (n, 3) of the rows; place (n, 3): on the platform or
+    the world; left_mm: median residual.
     """
-    some = np.flatnonzero(poses.closed)
-    some = some[np.linspace(0, len(some) - 1, min(_SOME_POSES, len(some))).astype(int)]
-    drive, back, result = sheet.actuators(command)[some], poses.turn[some].transpose(0, 2, 1), []
-    origin = poses.point(np.zeros(3))[some]
-    for k, part in enumerate(sheet.mechanism.parts.drives):
-        moved = sheet.mechanism.solve(drive + LARGE[part.unit] * np.eye(drive.shape[1])[k], command[some])
-        turn, shift = back @ moved.turn, (back @ (moved.point(np.zeros(3)) - origin)[:, :, None])
-        move = np.concatenate([turn - np.eye(3), shift], axis=2)
-        size = np.abs(move[:, :, :3]).max() * sheet.mechanism.size_mm + np.abs(shift).max()
-        apart = np.ptp(move[:, :, :3], axis=0).max() * sheet.mechanism.size_mm + np.ptp(shift, axis=0).max()
-        if moved.closed.all() and apart < _ALIKE * size:
-            result.append(move[0])
-    return result
+    poses, drive, command = posed
+    chosen = _some_readings(frames, poses)
+    at, its, known = poses.of(chosen), place[chosen], frames.known[chosen]
+    names, on_world = frames.names[chosen], frames.on_world[chosen]
+    seen, free = at.point(its), [name for name in dict.fromkeys(names[~known].tolist())]
+    columns = np.zeros((len(chosen), 3, 6 + 3 * len(free)))
+    if frames.registered:
+        columns[:, :, :3] = np.eye(3)
+        columns[:, :, 3:6] = -np.cross(np.eye(3), (seen - seen.mean(axis=0))[:, None] / robot.size_mm, axis=-1)
+    for k, name in enumerate(free):
+        columns[names == name, :, 6 + 3 * k : 9 + 3 * k] = at.turn[names == name]
+    moves = np.empty((len(chosen), 3, drive.shape[1]))
+    for k, part in enumerate(robot.parts.drives):
+        moved = robot.solve(drive[chosen] + LARGE[part.unit] * np.eye(drive.shape[1])[k], command[chosen])
+        shift = np.where(on_world[:, None], 0.0, moved.point(its) - seen)
+        moves[:, :, k] = np.where(moved.closed[:, None], shift, 0.0)
+    flat = moves.reshape(-1, drive.shape[1])
+    fitted = np.linalg.lstsq(columns.reshape(len(flat), -1), flat, rcond=1e-9)[0]
+    left = flat - columns.reshape(len(flat), -1) @ fitted
+    alike = np.abs(left).max(axis=0) <= _ALIKE * np.abs(flat).max(axis=0)
+    left_by_all = np.sqrt((left[:, ~alike] ** 2).sum() / len(chosen))
+    size = np.where(alike, 1.0, min(left_mm / max(left_by_all, 1e-12), 1.0))
+    return {name: size[:, None] * fitted[6 + 3 * k : 9 + 3 * k].T for k, name in enumerate(free)}
+
+
+def _some_readings(frames: Frames, poses: Poses) -> np.ndarray:
+    """Rows (m,) of some readings of each reflector that the robot carries or whose place is known."""
+    usable = poses.closed & (frames.known | ~frames.on_world)
+    generator, chosen = np.random.default_rng(0), []
+    for name in dict.fromkeys(frames.names.tolist()):
+        its = np.flatnonzero(usable & (frames.names == name))
+        chosen.append(generator.permutation(its)[:_SOME_READINGS])
+    return np.sort(np.concatenate(chosen))
 
 
 def _place_text(place: np.ndarray, still: np.ndarray, about: float) -> str:

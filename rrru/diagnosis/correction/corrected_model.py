@@ -17,7 +17,7 @@ from rrru.arrays import FloatArray
 from rrru.campaign import measurements as rows
 from rrru.campaign.stated_motion import rests
 from rrru.diagnosis.correction.corrected_file import Corrected, corrected
-from rrru.diagnosis.correction.drive_table import at_end, at_rest, corrected_drives, effect_twists
+from rrru.diagnosis.correction.drive_table import at_rest, corrected_drives, effect_twists
 from rrru.diagnosis.diagnose import Diagnosis
 from rrru.diagnosis.inference import InferenceResult
 from rrru.diagnosis.options import OPTIONS
@@ -315,6 +315,8 @@ def _fresh_differences(
     """Vectors (n, 3) from the file's robot to the diagnosed one at fresh poses, NaN where one of them has none.
 
     The drive values are weighted means of those at three measured poses, so that they lie within the measured range.
+    Payload and time are those of one of the three, and each drive comes from either side: an effect makes the error
+    that it has in the campaign, and the backlashes of several drives add up as independent errors.
     """
     problem = inference.problem
     robot, (actuators, command) = problem.mechanism, problem.driven
@@ -323,13 +325,14 @@ def _fresh_differences(
     picks = usable[generator.integers(len(usable), size=(OPTIONS.fresh_poses, 3))]
     share = generator.dirichlet(np.ones(3), len(picks))
     drive, near = (np.einsum("nk,nkd->nd", share, values[picks]) for values in (actuators, command))
-    approach = generator.choice([-1.0, 1.0], size=(len(picks), 1))
+    approach = generator.choice([-1.0, 1.0], size=drive.shape)
     poses = robot.solve(drive, near)
     closed = np.flatnonzero(poses.closed)
-    drive, approach = drive[closed], approach[closed]
+    drive, approach, like = drive[closed], approach[closed], picks[closed, 0]
     position = robot.measured(poses.of(closed), robot.twists())
-    motion = at_rest(robot, masses, (position, drive, *at_end(problem)), approach, drive)
-    readings = None if problem.readings is None else problem.readings.of(picks[closed, 0])
+    conditions = (np.nan_to_num(values[like]) for values in (problem.motion.payload_kg, problem.motion.time_s))
+    motion = at_rest(robot, masses, (position, drive, *conditions), approach, drive)
+    readings = None if problem.readings is None else problem.readings.of(like)
     diagnosed, written = (
         robot.twists(inference.state.deviations) + effect_twists(inference, motion),
         model.twists(motion),

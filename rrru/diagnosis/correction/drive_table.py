@@ -94,16 +94,17 @@ def at_end(problem: DiagnosisProblem) -> tuple[float, float]:
 def at_rest(
     robot: Robot,
     masses: Masses,
-    state: tuple[FloatArray, FloatArray, float, float],
+    state: tuple[FloatArray, FloatArray, float | FloatArray, float | FloatArray],
     approach: float | FloatArray,
     nominal: FloatArray,
 ) -> Motion:
-    """The Motion at rest at positions (n, 3) and drives (n, K), to which all drives came from one side.
+    """The Motion at rest at positions (n, 3) and drives (n, K), each of which came from one side.
 
-    approach: 1 from smaller values, -1 from larger ones, one number or (n, 1); nominal (n, K): drive values that bring
-    the nominal robot there, which is where it stands.
+    state: positions in mm, drives, payload in kg and time in s, one number or (n,); approach: 1 from smaller values, -1
+    from larger ones, one number or (n, K); nominal (n, K): drive values that bring the nominal robot there, which is
+    where it stands.
     """
-    position, drive, payload, end_s = state
+    position, drive, payload, time_s = state
     count, nothing = len(position), np.zeros_like(position)
     before = drive - approach * np.array([_APPROACH[unit] for unit in robot.parts.units])
     path = np.stack([before, drive], axis=1).reshape(2 * count, -1)
@@ -112,7 +113,7 @@ def at_rest(
         drive=drive,
         path_drive=path,
         path_index=2 * np.arange(count) + 1,
-        time_s=np.full(count, end_s),
+        time_s=np.full(count, time_s),
         velocity_mm_s=nothing,
         acceleration_mm_s2=nothing,
         payload_kg=np.full(count, payload),

@@ -22,6 +22,7 @@ from rrru.kinematics.base_parameters import direction
 from rrru.kinematics.readings import Readings
 from rrru.robots.catalogue import make_mechanism
 from rrru.robots.from_dh import from_dh
+from rrru.robots.hexapod import hexapod
 from rrru.robots.rrru3 import Rrru3
 from tests.places import ROOT
 from tests.schemas import check_measurements
@@ -372,8 +373,10 @@ def test_a_place_is_stated_as_far_as_the_readings_determine_it(tmp_path, seed):
     assert off < 3.0 * float(numbers[4]) < 10.0
 
 
-def test_the_zero_of_the_last_drive_is_in_the_precision_of_a_place(tmp_path):
-    """A zero offset of the axis that carries the platform turns all reflectors about it: nothing else is wrong here."""
+# a zero offset of 9 mrad is so large that it is found with the frame, when the file is read
+@pytest.mark.parametrize("found_one", [0.0, 9e-3])
+def test_the_zero_of_the_last_drive_is_in_the_precision_of_a_place(tmp_path, found_one):
+    """A zero offset of the axis that carries the platform turns all reflectors about it."""
     generator = np.random.default_rng(7)
     links = ({"a_mm": 325.0, "range_deg": [-120, 120]}, {"a_mm": 225.0, "alpha_deg": 90, "range_deg": [-130, 130]})
     wrist = ({"a_mm": 60.0, "alpha_deg": -90, "range_deg": [-100, 100]}, {"range_deg": [-170, 170]})
@@ -381,7 +384,7 @@ def test_the_zero_of_the_last_drive_is_in_the_precision_of_a_place(tmp_path):
     low, high = robot.drive_range.T
     driven = low + (high - low) * generator.random((60, 4))
     places = {"one": (40.0, 10.0, -35.0), "two": (-60.0, 25.0, -80.0)}
-    table = _seen_by_a_tracker(robot, driven, places, {"dq4": 4e-3}, generator)
+    table = _seen_by_a_tracker(robot, driven, places, {"dq2": found_one, "dq4": 4e-3}, generator)
     for note in _taken(tmp_path, table, robot, frame="register").notes:
         if found := re.fullmatch(
             r"reflector (\w+) found at \((.*), (.*), (.*)\) mm on the platform, to about (.*) mm", note
@@ -389,6 +392,28 @@ def test_the_zero_of_the_last_drive_is_in_the_precision_of_a_place(tmp_path):
             place, about = np.array(found.groups()[1:4], dtype=float), float(found[5])
             off = np.linalg.norm(place - places.pop(found[1]))
             assert 4e-3 * 30.0 < off < about < 2.0
+    assert not places
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_what_zeros_of_several_drives_move_all_places_by_is_in_their_precision(tmp_path, seed):
+    """Errors of the legs of a hexapod move its platform nearly alike in all poses, so that the residual hides them."""
+    generator, pairs = np.random.default_rng(seed), np.repeat([0.0, 120.0, 240.0], 2)
+    foot, head = (np.radians(pairs + np.tile([-1.0, 1.0], 3) * apart) for apart in (17.0, 44.0))
+    foot, head = (np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=1) for angle in (foot, head))
+    robot = hexapod(250.0 * foot, 170.0 * head, 450.0, 80.0)
+    driven = robot.inverse(np.array([[0.0, 0.0, 450.0]])) + generator.uniform(-40.0, 40.0, (60, 6))
+    zeros = {f"dl{k}": generator.normal(0.0, 0.4) for k in range(1, 7)}
+    places = {"one": (60.0, 0.0, 40.0), "two": (-50.0, 60.0, 40.0)}
+    table = _seen_by_a_tracker(robot, driven, places, zeros, generator)
+    seen = _FRAME.inv().apply(table[[*_POINTS]].to_numpy() - _SHIFT)
+    table = table.assign(**dict(zip(_POINTS, seen.T, strict=True)))
+    for note in _taken(tmp_path, table, robot).notes:
+        if found := re.fullmatch(
+            r"reflector (\w+) found at \((.*), (.*), (.*)\) mm on the platform, to about (.*) mm", note
+        ):
+            place, about = np.array(found.groups()[1:4], dtype=float), float(found[5])
+            assert np.linalg.norm(place - places.pop(found[1])) < 2.5 * about < 10.0
     assert not places
 
 

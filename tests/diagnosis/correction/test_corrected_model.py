@@ -51,7 +51,8 @@ class _Campaign:
     shrink: object
 
 
-def _campaign(name, folder, points):
+def _campaign(name, folder, points, effects=None):
+    effects = effects or _EFFECTS[name]
     section, generator = _SECTIONS[name], np.random.default_rng(3)
     robot = make_mechanism(name, section, parameter_set="full")
     parameters, (x, y, z) = robot.parameters, robot.legs.home_mm.tolist()
@@ -61,7 +62,7 @@ def _campaign(name, folder, points):
     virtual = {
         "name": name,
         "seed": 1,
-        "robot": {"errors": errors, "effects": _EFFECTS[name], **masses},
+        "robot": {"errors": errors, "effects": effects, **masses},
         "trajectories": {"lines": lines | {"points": points}},
         "passes": [{"reverse": reverse, "payload_kg": 0.0} for reverse in (False, True)],
         "motion": {"speed_mm_s": 50.0, "acceleration_mm_s2": 500.0, "dwell_s": 1.0},
@@ -71,13 +72,11 @@ def _campaign(name, folder, points):
     nominal = {"name": name, "dimensions": section, "parameter_set": "full"}
     frame, _ = setup.virtual_campaign(nominal, virtual).run()
     known = MeasuredRobot(setup.measured_robot(nominal, frame), _MASSES, _NOISE_MM, name, _NOISE_RAD)
-    effects = (*_EFFECTS[name], "drive_compliance", "thermal_growth")
-    result = diagnose(frame, known, GapSettings(effects, draws=20))
+    tested = (*effects, "drive_compliance", "thermal_growth")
+    result = diagnose(frame, known, GapSettings(tested, draws=20))
     shrink = result.tables["gap_shrink"]
     file = folder / f"corrected.{'xml' if 'mjcf' in section else 'urdf'}"
-    return _Campaign(
-        robot, errors, _EFFECTS[name], frame, write_corrected(result, section, _MASSES, file), file, shrink
-    )
+    return _Campaign(robot, errors, effects, frame, write_corrected(result, section, _MASSES, file), file, shrink)
 
 
 @pytest.fixture(scope="module")
@@ -309,7 +308,7 @@ def test_the_stated_error_of_a_corrected_file_is_that_from_the_true_robot(name, 
     picks, share = generator.integers(len(measured), size=(200, 2)), generator.random((200, 1))
     drive, near = (share * one[picks[:, 0]] + (1.0 - share) * one[picks[:, 1]] for one in (measured, command))
     place = robot.forward(drive, guess_mm=near)
-    motion = at_rest(robot, _MASSES, (place, drive, 0.0, 0.0), generator.choice([-1.0, 1.0], (200, 1)), drive)
+    motion = at_rest(robot, _MASSES, (place, drive, 0.0, 0.0), generator.choice([-1.0, 1.0], drive.shape), drive)
     twists = robot.twists_of(campaign.errors) + together(active_effects(campaign.effects, robot), motion).twists
     true = robot.measured(robot.solve(drive, place, twists), twists)
     key = "mjcf" if "mjcf" in section else "urdf"
@@ -323,6 +322,13 @@ def test_the_stated_error_of_a_corrected_file_is_that_from_the_true_robot(name, 
     stated = campaign.found.verdict["file_error_fresh_mm"]
     # the estimate itself is off by as much as its noise, which the file cannot know
     assert off == pytest.approx(stated, rel=0.1, abs=_NOISE_MM)
+
+
+def test_the_error_of_a_file_that_lacks_a_drift_is_that_of_the_whole_campaign_and_not_of_its_end(tmp_path):
+    """A drift d over the campaign leaves d / sqrt(12) about its middle, and d / 2 at its end."""
+    found = _campaign("arm", tmp_path, 25, {"base_drift": {"speed_x": 5e-4, "speed_z": -1e-3}}).found.verdict
+    assert found["effects"] == "base_drift"
+    assert found["file_error_fresh_mm"] == pytest.approx(found["file_error_mm"], rel=0.15)
 
 
 def _left(found, kind):

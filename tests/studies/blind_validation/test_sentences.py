@@ -226,6 +226,7 @@ _CASES = [
     ("rms of the given_model", ({"value": 1.2}, {}, _FACTS), ({"value": 1.6}, {}, _FACTS)),
     ("rms of the corrected_model", ({"value": 0.30}, {}, _FACTS), ({"value": 0.1}, {}, _FACTS)),
     ("the corrected file is as good as the estimate", ({}, {}, _FACTS), ({}, {"file_mm": 0.59}, _FACTS)),
+    ("error to expect of the corrected file", ({"value": 0.011}, {}, {}), ({"value": 0.05}, {}, {})),
     ("the corrected file is not worse than the given one", ({}, {}, _FACTS), ({}, {"file_mm": 50.0}, _FACTS)),
     ("corrected_drives bring it there", ({}, {}, _FACTS), ({}, {"drives_mm": 0.4}, _FACTS)),
     (

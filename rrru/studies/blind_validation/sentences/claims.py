@@ -213,6 +213,8 @@ def _of_facts(facts):
         result.append(Claim("gap_after_rms_mm", f"{after:.4g} mm", {"value": after}))
         ends = facts["share_closed_low"], facts["share_closed_high"]
         result.append(Claim("interval of share_closed", f"{ends[0]:.3f} to {ends[1]:.3f}", {"ends": ends}))
+    if (expected := (facts["corrected_file"] or {}).get("expected_mm")) is not None:
+        result.append(Claim("error to expect of the corrected file", f"{expected:.4g} mm", {"value": expected}))
     for part in facts["budget"]:
         ends = part["share_low"], part["share_high"]
         stated = {"part": part["part"], "kind": part["kind"], "ends": ends}

@@ -298,6 +298,11 @@ def _as_good(_stated, truth, facts):
     return bool(file and (file["remainder"] or file["headline"]))
 
 
+def _expected(stated, truth, _facts):
+    """The error of the corrected file at fresh stops."""
+    return _sized(stated["value"], truth.file_mm, truth, truth.stops)
+
+
 def _not_worse(_stated, truth, _facts):
     """The error of the corrected file is at most that of the given file."""
     known = np.isfinite(truth.file_mm) and np.isfinite(truth.given_mm)
@@ -421,6 +426,7 @@ _JUDGES = {
     "rms of the corrected_model": lambda stated, t, _: _within(stated["value"], t.file_read_mm),
     "the corrected file is as good as the estimate": _as_good,
     "the corrected file is not worse than the given one": _not_worse,
+    "error to expect of the corrected file": _expected,
     "corrected_drives bring it there": _drives,
     "detectable_mm": _detectable,
 }
