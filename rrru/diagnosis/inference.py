@@ -26,6 +26,7 @@ from rrru.diagnosis.settings import Prior
 from rrru.diagnosis.state import LinearizedProblem, ModelState
 from rrru.diagnosis.terms import EffectTerm, each_leg, shape_probabilities
 from rrru.diagnosis.whitened import DISCREPANCY_SCALES, spectrum
+from rrru.effects.library import HOLDS
 from rrru.effects.protocol import Coordinates
 from rrru.errors import FitError
 from rrru.estimation.noise_model import (
@@ -420,4 +421,30 @@ def _rounds(problem: DiagnosisProblem, calibrated: ModelState, prior: Prior, sta
     hypothesis, level = posterior.best()
     result = InferenceResult(problem, start, calibrated, fit, evidence, posterior, hypothesis, level, source)
     # estimate and hypothesis are of one set, whether the rounds have converged or cycle
-    return with_effects(result, hypothesis.effects)
+    result = with_effects(result, hypothesis.effects)
+    for name in sorted(hypothesis.effects):
+        if not result.hypothesis.effects.isdisjoint(HOLDS.get(name, ())):
+            result = _about_the_special_case(result, prior, name)
+    return result
+
+
+def _about_the_special_case(inference: InferenceResult, prior: Prior, general: str) -> InferenceResult:
+    """The inference, or the one about the fit without an effect that holds another one of the hypothesis, if higher.
+
+    Together the two can make up for a linearisation that is wrong for the special case alone, as where a stop moves a
+    drive by less than its backlash, and a linearisation about both then keeps both. The evidence is an expansion about
+    a mode of the posterior (Tierney and Kadane, Accurate approximations for posterior moments and marginal densities,
+    Journal of the American Statistical Association 81, 1986): of several modes the highest one counts.
+    """
+    special = with_effects(inference, inference.hypothesis.effects - {general})
+    try:
+        problem = special.problem.standing(special.state).with_approach(special.state)
+        evidence = problem.evidence(problem.linearise(special.state))
+    except FitError:
+        return inference
+    space = ModelSpace(evidence.on_library(), prior)
+    posterior = space.confirmed(space.climb(special.hypothesis.terms))
+    if posterior.height <= inference.posterior.height:
+        return inference
+    found = replace(special, problem=problem, evidence=evidence).with_posterior(posterior)
+    return with_effects(found, found.hypothesis.effects)

@@ -452,6 +452,19 @@ def test_a_judged_page_is_what_the_library_answers(tmp_path):
     np.testing.assert_allclose(found.rotation @ own.frame[0], np.eye(3), atol=5e-3)
 
 
+def test_a_stop_that_moves_a_slide_by_less_than_its_backlash_is_no_windup(tmp_path):
+    """At such a stop a narrow backlash moves the slide the other way: with a windup both made up for that."""
+    from rrru.studies.blind_validation.sentences import page
+    from rrru.studies.blind_validation.sentences.draws import draw
+
+    own = draw(13, 770213, 300, 0.1)
+    rows = own.table(own.readings(own.poses()), True)[np.repeat(~own.stops.fresh, len(own.targets))]
+    own.write(tmp_path, rows, "stops.csv")
+    section, robot = own.section(tmp_path, "stops.csv"), own.nominal.section(str(tmp_path / own.robot_file), own.kind)
+    facts = page.run(own.name, section, robot, {}).page.facts
+    assert own.cause.name == "backlash" and [effect["name"] for effect in facts["effects"]] == ["backlash"]
+
+
 def test_a_mistake_is_judged_by_the_words_that_it_gets(tmp_path):
     from rrru.studies.blind_validation.sentences import mistakes
 
