@@ -113,10 +113,10 @@ class Twin:
             {shape: {**configured[shape], **searched[shape]} for shape in ("lines", "spiral")}
         )
 
-    def robot(self, mechanism, kind=VirtualRobot):
+    def robot(self, mechanism):
         """The virtual robot of this candidate."""
         section = self.robot_section()
-        return kind(
+        return VirtualRobot(
             mechanism=mechanism,
             deviations=section["errors"],
             effects=active_effects(section["effects"], Rrru3()),

@@ -31,19 +31,25 @@ def misfit(found, orders, weights=None):
 
 def surprises(found, orders):
     """Contribution in nat of every printed number and of every order to `misfit`, by name."""
-    result = {}
-    for item, printed in ERRORS_MM.items():
-        ratio = np.asarray(found[item]) / printed
-        half = printed_half_mm(item) / abs(printed)
-        spread = np.hypot(max(np.std(ratio, ddof=1), _LEAST_SCATTER), half / np.sqrt(3.0))
-        lack = (1.0 - np.mean(ratio)) / spread
+    printed = np.array(list(ERRORS_MM.values()))
+    ratios = np.array([found[item] for item in ERRORS_MM]) / printed[:, None]
+    half = np.array([printed_half_mm(item) for item in ERRORS_MM]) / np.abs(printed)
+    mean, spread = _moments(ratios)
+    spread = np.hypot(spread, half / np.sqrt(3.0))
+    lack = (1.0 - mean) / spread
+    result = dict(zip(ERRORS_MM, -(_log_t_density(lack) + np.log(2.0 * half / spread)), strict=True))
+    for k, item in enumerate(ERRORS_MM):
         if item in numbers.UPPER_LIMITS:
-            result[item] = -_log_t_cdf(lack)
-        else:
-            result[item] = -(_log_t_density(lack) + np.log(2.0 * half / spread))
-    for name, margin in orders.items():
-        result[f"order_{name}"] = -_log_t_cdf(np.mean(margin) / max(np.std(margin, ddof=1), _LEAST_SCATTER))
-    return result
+            result[item] = -_log_t_cdf(lack[k])
+    if not orders:
+        return result
+    mean, spread = _moments(np.array(list(orders.values())))
+    return result | {f"order_{name}": -_log_t_cdf(t) for name, t in zip(orders, mean / spread, strict=True)}
+
+
+def _moments(values):
+    """Means and standard deviations of draws (n, d)."""
+    return values.mean(axis=1), np.maximum(values.std(axis=1, ddof=1), _LEAST_SCATTER)
 
 
 def draw_misfit(found, orders):
