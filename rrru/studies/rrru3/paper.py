@@ -5,7 +5,6 @@ Its parts: design; sweeps, Tables 3 and 4; fitted, Tables 5 and 6 with dr - dR; 
 second time with another value or only as a bound and are not part of the twin's search; orders, 1 where one holds.
 """
 
-from functools import cache
 from pathlib import Path
 
 from rrru.studies.paper import read_numbers
@@ -32,7 +31,6 @@ ERRORS_MM = {number.item: number.value for number in ERRORS}
 _DECIMALS = {"group1_after_max": 3}
 
 
-@cache
 def printed_half_mm(item):
     """Half a unit of the last digit to which an error is printed."""
     text = f"{ERRORS_MM[item]:.10g}"

@@ -26,7 +26,9 @@ from rrru.robots.rrru3_kernels import forward
 from rrru.simulation.driven import non_repeatability
 from rrru.studies.rrru3 import study_numbers as numbers
 from rrru.studies.rrru3 import twin_kernels as kernels
+from rrru.studies.rrru3 import twin_objective
 from rrru.studies.rrru3.linear_fit import linear_fit
+from rrru.studies.rrru3.paper import ERRORS_MM
 from rrru.studies.rrru3.twin import SPIKE_POINTS, Twin, search_bounds
 from rrru.studies.rrru3.twin_objective import misfit
 
@@ -37,6 +39,8 @@ SPIRAL_MARGIN = 0.1
 # ASSUME the paper does not say which lines Table 5 was fitted on: "group_1" (26 points) or "lines" (all seven groups)
 LINE_CALIBRATIONS = ("group_1", "lines")
 WORST = 1e6
+# of `group_orders` and `link_order`
+_GROUP_ORDERS = 8
 NOT_DRIVEN = (UnreachableError, FitError, np.linalg.LinAlgError)
 # of the random streams of a campaign that is measured, calibrated and driven again
 _LABELS = ("measure", "closed_loop")
@@ -317,9 +321,21 @@ def _spiral(shape, count, speed_mm_s, acceleration_mm_s2):
 
 def cost(values, task):
     """Misfit in nat of searched values, in the order of the task's bounds; a large number where it cannot be driven."""
-    twin = Twin(dict(zip(task.bounds, np.asarray(values).tolist(), strict=True)))
     try:
-        value = misfit(*simulate(task, twin), task.weights)
+        value = misfit(*simulate(task, _twin(values, task)), task.weights)
     except NOT_DRIVEN:
         return WORST
     return value if np.isfinite(value) else WORST
+
+
+def residuals(values, task, tolerance):
+    """Residuals (m,) of searched values, see `twin_objective.residuals`; NaN where they cannot be driven."""
+    try:
+        return twin_objective.residuals(*simulate(task, _twin(values, task)), task.weights, tolerance)
+    except NOT_DRIVEN:
+        return np.full(2 * len(ERRORS_MM) + _GROUP_ORDERS + 2 * task.spikes, np.nan)
+
+
+def _twin(values, task):
+    """The Twin of searched values."""
+    return Twin(dict(zip(task.bounds, np.asarray(values).tolist(), strict=True)))

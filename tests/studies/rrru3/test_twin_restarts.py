@@ -10,8 +10,8 @@ from rrru.studies.rrru3 import twin, twin_restarts, twin_search
 from rrru.studies.rrru3.schemas import TABLES
 from tests.studies.rrru3.test_twin import CANDIDATE, CONFIGURED, MOTION
 
-SECTION = {"seed": 3, "share": 0.02, "spread": 0.1, "candidates": 5, "population": 6, "stall_generations": 50}
-SECTION |= {"stall_nat": 0.1, "evaluations": 25, "restarts": 2, "hours": 1.0, "hypotheses": {}}
+SECTION = {"seed": 3, "share": 0.02, "candidates": 2, "members": 3, "stall_descents": 50, "stall_nat": 0.1}
+SECTION |= {"evaluations": 400, "restarts": 2, "hours": 1.0, "hypotheses": {}}
 
 
 @pytest.fixture(scope="module")
@@ -35,8 +35,7 @@ def test_the_same_seed_gives_the_same_restarts_on_any_number_of_processes(task, 
     assert [one.best for one in other] != [one.best for one in whole[0]]
 
 
-def test_an_interrupted_search_ends_with_the_bytes_of_an_uninterrupted_one(task, whole, tmp_path, monkeypatch):
-    monkeypatch.setattr(twin_restarts, "_SAVED_EVERY", 1)
+def test_an_interrupted_search_ends_with_the_bytes_of_an_uninterrupted_one(task, whole, tmp_path):
     path, direct = tmp_path / "state.json", tmp_path / "direct.json"
     twin_restarts.search(task, SECTION, CANDIDATE, path=direct)
     for _ in range(20):
