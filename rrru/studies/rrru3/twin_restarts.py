@@ -136,10 +136,10 @@ class Restart:
     def _check(self):
         """Whether the restart ends, and why."""
         stall, history = self.section["stall_descents"], self.history
-        if len(history) > max(stall, self.section["members"]):
-            if history[-1 - stall][1] - self.best < self.section["stall_nat"]:
-                self.stopped = "stalled"
-        if not self.stopped and self.evaluations >= self.section["evaluations"]:
+        full = self.descents > self.section["members"]
+        if full and len(history) > stall and history[-1 - stall][1] - self.best < self.section["stall_nat"]:
+            self.stopped = "stalled"
+        elif self.evaluations >= self.section["evaluations"]:
             self.stopped = "evaluations"
 
     @property
