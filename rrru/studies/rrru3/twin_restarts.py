@@ -1,12 +1,13 @@
 """Search for the twin by restarts, resumable: the same seed gives the same bytes however often it stops.
 
 The objective has many optima. A restart holds several of them, all found by `twin_descent`: first from random
-candidates, then from children of those that it holds. A child takes each part of the robot and of its path from one of
-two, is one moved along the difference of two others (differential evolution: Storn and Price, Journal of Global
-Optimization 11, 1997), or is one with random changes. The optimum that it descends to replaces the nearest one where
-that is the same, otherwise the worst. (A memetic algorithm: Neri and Cotta, Swarm and Evolutionary Computation 2,
-2012.) A restart ends where its best no longer improves. The search ends where the three best restarts agree, or with
-its time or its number of restarts. The state, a file of JSON, holds all that the next descent depends on.
+candidates, then from the best of some children of those that it holds. Children take each part of the robot and of its
+path from one of two, or have one part drawn anew, or are moved along the difference of two others (differential
+evolution: Storn and Price, Journal of Global Optimization 11, 1997), or have random changes. The optimum that a child
+descends to replaces the nearest one where that is the same, otherwise the worst. (A memetic algorithm: Neri and Cotta,
+Swarm and Evolutionary Computation 2, 2012.) A restart ends where its best no longer improves. The search ends where the
+three best restarts agree, or with its time or its number of restarts. The state, a file of JSON, holds all that the
+next descent depends on.
 """
 
 import hashlib
@@ -26,7 +27,7 @@ from rrru.seeds import stream
 from rrru.store import json_files
 from rrru.studies.rrru3 import twin_objective
 from rrru.studies.rrru3.twin import PERIODIC, Twin, parts
-from rrru.studies.rrru3.twin_descent import descend
+from rrru.studies.rrru3.twin_descent import TOLERANCE, descend
 from rrru.studies.rrru3.twin_search import WORST, residuals
 
 # restarts that have to agree, and within which share of the objective
@@ -77,7 +78,8 @@ class Restart:
             return rate(self.values(genes), tolerance)
 
         first = self.descents < self.section["members"]
-        genes, found = descend(counted, self._first(counted) if first else self._child(), self.periodic)
+        begin = self._first if first else self._child
+        genes, found = descend(counted, begin(counted), self.periodic)
         self.descents += 1
         value = 0.5 * found @ found + twin_objective.least(self.task.weights)
         self._hold(genes, float(np.nan_to_num(value, nan=WORST)))
@@ -89,24 +91,34 @@ class Restart:
         if self.start is not None:
             spread = self.section["share"] if self.descents else 0.0
             return self._inside(self.start + spread * self.generator.standard_normal(len(self.start)))
-        genes = self.generator.random((self.section["candidates"], len(self.low)))
-        squares = np.nan_to_num((rate(genes, 0.0) ** 2).sum(axis=1), nan=np.inf)
-        return genes[squares.argmin()]
+        return _best(rate, self.generator.random((self.section["candidates"], len(self.low))))
 
-    def _child(self):
-        """Where another descent begins: a child of the optima, of each kind in turn."""
-        count = len(self.genes)
-        one, two, three = self.genes[self.generator.integers(count, size=3)]
-        kind = self.descents % 3
+    def _child(self, rate):
+        """Where another descent begins: the best of children of one kind, each kind in turn."""
+        shape = self.section["candidates"], len(self.low)
+        one, two, three = self.genes[self.generator.integers(len(self.genes), size=(3, shape[0]))]
+        kind = self.descents % 4
         if kind == 0:
-            from_two = self.generator.random(len(parts(self.task.bounds))) < 0.5
-            taken = np.repeat(from_two, [len(part) for part in parts(self.task.bounds)])
-            genes = np.where(taken, two, one)
+            # every part from one of two
+            children = np.where(self._parts(shape[0], 0.5), two, one)
         elif kind == 1:
-            genes = one + self.generator.uniform(*_SHARES) * self._apart(two, three)
+            # a part drawn anew
+            children = np.where(self._parts(shape[0]), self.generator.random(shape), one)
+        elif kind == 2:
+            # along a difference
+            children = one + self.generator.uniform(*_SHARES, (shape[0], 1)) * self._apart(two, three)
         else:
-            genes = one + self.generator.choice(_CHANGES) * self.generator.standard_normal(len(one))
-        return self._inside(genes)
+            # a single one with random changes: the best of many would hardly be changed
+            children = one[:1] + self.generator.choice(_CHANGES) * self.generator.standard_normal((1, shape[1]))
+        return _best(rate, self._inside(children))
+
+    def _parts(self, count, share=None):
+        """Whether a gene is in a part that is chosen, (count, p): with a probability, or that of a gene for all."""
+        sizes = [len(part) for part in parts(self.task.bounds)]
+        if share is None:
+            number = np.repeat(np.arange(len(sizes)), sizes)
+            return np.tile(number == self.generator.choice(number), (count, 1))
+        return np.repeat(self.generator.random((count, len(sizes))) < share, sizes, axis=1)
 
     def _hold(self, genes, objective):
         """Hold an optimum in place of one that is the same, or of the worst one, where it is better."""
@@ -162,6 +174,12 @@ class Restart:
         restart.history = [tuple(entry) for entry in state["history"]]
         restart.genes = np.reshape(state["genes"], (-1, len(restart.low)))
         return restart
+
+
+def _best(rate, genes):
+    """The best of genes (n, p) with the tolerance of a descent's beginning."""
+    squares = np.nan_to_num((rate(genes, TOLERANCE) ** 2).sum(axis=1), nan=np.inf)
+    return genes[squares.argmin()]
 
 
 def search(task, section, start=None, workers=1, path=None, limit=None):
