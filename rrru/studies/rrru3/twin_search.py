@@ -3,10 +3,11 @@
 Searched: the 7 identifiable geometry errors, clearance and backlash per leg, a periodic drive error (amplitude and
 phase per leg, whole number of periods per turn), non-repeatability, the line groups' spacing and the spiral's shape.
 No number of the paper enters the simulation. All candidates have the same draws of non-repeatability and noise (common
-random numbers), so that the objective is smooth; see `twin_objective`. For speed the search solves eq. (8) with
-clearance to first order, which agrees with the spatial closure to micrometres for ideal axes. It calibrates on a
-linearised model, which is accurate to hundredths of a millimetre where it was calibrated. The result is then run and
-calibrated like every other campaign. Lengths in mm, angles in rad.
+random numbers), so that the objective is smooth; see `twin_objective`. For speed the search solves eq. (8), compiled,
+with clearance to first order. For ideal axes this agrees with the spatial closure to hundredths of a millimetre, near
+the lines' singular start, and to micrometres elsewhere. It calibrates on a linearised model, which is accurate to
+hundredths of a millimetre where it was calibrated. The result is then run and calibrated like every other campaign.
+Lengths in mm, angles in rad.
 """
 
 from dataclasses import dataclass, replace
