@@ -142,6 +142,12 @@ class Twin:
         )
 
 
+def settled(twin):
+    """The same Twin with whole numbers where only these count: the periods a turn and the side."""
+    whole = {"ratio": twin.robot_section()["effects"]["transmission_error"]["ratio"]}
+    return Twin(twin.values | whole | {"side": 1.0 if twin.values["side"] >= 0.0 else -1.0})
+
+
 def from_config(virtual):
     """The configured twin: the virtual robot and the trajectories of a virtual campaign's section, as a Twin.
 

@@ -26,13 +26,13 @@ import pandas as pd
 from rrru.seeds import stream
 from rrru.store import json_files
 from rrru.studies.rrru3 import twin_objective
-from rrru.studies.rrru3.twin import PERIODIC, Twin, parts
+from rrru.studies.rrru3.twin import PERIODIC, Twin, parts, settled
 from rrru.studies.rrru3.twin_descent import TOLERANCE, descend
 from rrru.studies.rrru3.twin_search import WORST, residuals
 
 # restarts that have to agree, and within which share of the objective
 AGREEING, AGREEMENT = 3, 0.01
-# optima are the same where no gene differs by more
+# optima are the same within this root mean square difference of their genes
 _SAME = 0.05
 # a child's share of a difference, and standard deviations of random changes, one of which is drawn
 _SHARES, _CHANGES = (0.2, 0.9), (0.01, 0.03, 0.1)
@@ -52,6 +52,9 @@ class Restart:
         self.task, self.section, self.number = task, section, number
         self.low, self.high = np.array(list(task.bounds.values())).T
         self.periodic = np.isin(list(task.bounds), PERIODIC)
+        groups = parts(task.bounds)
+        # numbers (p,) of the genes' parts
+        self._part = np.repeat(np.arange(len(groups)), [len(group) for group in groups])
         self.generator = stream(section["seed"], "twin", number)
         self.start = None if start is None else self._genes(start)
         self.genes, self.objectives = np.empty((0, len(self.low))), []
@@ -81,6 +84,7 @@ class Restart:
         begin = self._first if first else self._child
         genes, found = descend(counted, begin(counted), self.periodic)
         self.descents += 1
+        genes = self._genes(settled(self._twin(genes)))
         value = 0.5 * found @ found + twin_objective.least(self.task.weights)
         self._hold(genes, float(np.nan_to_num(value, nan=WORST)))
         self.history.append((self.evaluations, self.best))
@@ -95,35 +99,29 @@ class Restart:
 
     def _child(self, rate):
         """Where another descent begins: the best of children of one kind, each kind in turn."""
-        shape = self.section["candidates"], len(self.low)
-        one, two, three = self.genes[self.generator.integers(len(self.genes), size=(3, shape[0]))]
-        kind = self.descents % 4
+        shape, kind = (self.section["candidates"], len(self.low)), self.descents % 4
+        one, two, three = self.genes[np.resize(self.generator.permutation(len(self.genes)), 3)]
         if kind == 0:
-            # every part from one of two
-            children = np.where(self._parts(shape[0], 0.5), two, one)
+            # some parts from another
+            order = self.generator.permuted(np.tile(np.arange(self._part[-1] + 1), (shape[0], 1)), axis=1)
+            taken = order < self.generator.integers(1, self._part[-1] + 1, (shape[0], 1))
+            children = np.where(taken[:, self._part], two, one)
         elif kind == 1:
             # a part drawn anew
-            children = np.where(self._parts(shape[0]), self.generator.random(shape), one)
+            number = self._part[self.generator.integers(shape[1])]
+            children = np.where(self._part == number, self.generator.random(shape), one)
         elif kind == 2:
             # along a difference
             children = one + self.generator.uniform(*_SHARES, (shape[0], 1)) * self._apart(two, three)
         else:
             # a single one with random changes: the best of many would hardly be changed
-            children = one[:1] + self.generator.choice(_CHANGES) * self.generator.standard_normal((1, shape[1]))
+            children = one + self.generator.choice(_CHANGES) * self.generator.standard_normal((1, shape[1]))
         return _best(rate, self._inside(children))
-
-    def _parts(self, count, share=None):
-        """Whether a gene is in a part that is chosen, (count, p): with a probability, or that of a gene for all."""
-        sizes = [len(part) for part in parts(self.task.bounds)]
-        if share is None:
-            number = np.repeat(np.arange(len(sizes)), sizes)
-            return np.tile(number == self.generator.choice(number), (count, 1))
-        return np.repeat(self.generator.random((count, len(sizes))) < share, sizes, axis=1)
 
     def _hold(self, genes, objective):
         """Hold an optimum in place of one that is the same, or of the worst one, where it is better."""
         full = len(self.genes) >= self.section["members"]
-        apart = abs(self._apart(self.genes, genes)).max(axis=1)
+        apart = np.sqrt((self._apart(self.genes, genes) ** 2).mean(axis=1))
         if len(apart) and apart.min() < _SAME:
             place = int(apart.argmin())
         else:
@@ -157,7 +155,11 @@ class Restart:
     @property
     def twin(self):
         """The best Twin."""
-        return Twin(dict(zip(self.task.bounds, self.values(self.genes[0]).tolist(), strict=True)))
+        return self._twin(self.genes[0])
+
+    def _twin(self, genes):
+        """The Twin of genes (p,)."""
+        return Twin(dict(zip(self.task.bounds, self.values(genes).tolist(), strict=True)))
 
     def state(self):
         """All that the next descent depends on, for JSON."""

@@ -159,6 +159,14 @@ def test_a_ratio_at_its_lower_bound_is_one_period_a_turn():
     assert lowest.robot_section()["effects"]["transmission_error"]["ratio"] == 1.0
 
 
+def test_a_settled_twin_is_the_same_robot_on_the_same_path(task):
+    loose = twin.Twin(CANDIDATE.values | {"ratio": 6.3, "side": -0.2})
+    whole = twin.settled(loose)
+    assert whole.values["ratio"] == 6.0 and whole.values["side"] == -1.0
+    assert whole.robot_section() == loose.robot_section()
+    assert whole.trajectory_section() == loose.trajectory_section()
+
+
 def test_another_line_calibration_is_refused(task):
     with pytest.raises(ConfigError, match="'spiral'; allowed: group_1, lines"):
         replace(task, line_calibration="spiral")

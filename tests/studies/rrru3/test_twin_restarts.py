@@ -146,10 +146,9 @@ def test_children_of_a_kind_and_the_best_of_them(task):
         np.testing.assert_array_equal(best, seen[0][-1])
         return [dict(zip(names, child, strict=True)) for child in seen[0]]
 
-    values = [{child[name] for child in children(0) for name in names}, set()]
-    assert values[0] <= set(held)
     for child in children(0):
         assert all(len({child[name] for name in group}) == 1 for group in groups)
+        assert len(set(child.values())) == 2 and set(child.values()) <= set(held)
     drawn = [[group for group in groups if not {child[name] for name in group} <= set(held)] for child in children(1)]
     assert all(len(part) == 1 for part in drawn) and len({str(part) for part in drawn}) == 1
     # of one from another, all genes alike by the share of a difference
