@@ -142,6 +142,14 @@ class Twin:
         )
 
 
+def stated(section):
+    """The lines and the spiral of a `trajectories:` entry without what is searched."""
+    searched = {"lines": {"offsets_y_mm"}, "spiral": {*_SPIRAL, "turns", "start_deg"}}
+    return {
+        shape: {key: section[shape][key] for key in section[shape].keys() - keys} for shape, keys in searched.items()
+    }
+
+
 def settled(twin):
     """The same Twin with whole numbers where only these count: the periods a turn and the side."""
     whole = {"ratio": twin.robot_section()["effects"]["transmission_error"]["ratio"]}

@@ -30,7 +30,7 @@ from rrru.studies.rrru3 import twin_kernels as kernels
 from rrru.studies.rrru3 import twin_objective
 from rrru.studies.rrru3.linear_fit import linear_fit
 from rrru.studies.rrru3.paper import ERRORS_MM
-from rrru.studies.rrru3.twin import SPIKE_POINTS, Twin, search_bounds
+from rrru.studies.rrru3.twin import SPIKE_POINTS, Twin, search_bounds, stated
 from rrru.studies.rrru3.twin_objective import misfit
 
 # points of the fast simulation's path, and steps of a spiral's length, from one sampled point to the next
@@ -113,11 +113,11 @@ class Translational:
 class Task:
     """The campaign and the calibration of every candidate.
 
-    motion, trajectories: sections of the configuration; draws: see `draw`; line_calibration: one of LINE_CALIBRATIONS;
-    of_model: the errors after a calibration are those of the measured points against the calibrated model, not of a
-    robot that is driven again; registered: the tracker's frame is fitted to the commanded points; more: additional
-    effects that are searched, or "spikes", see `twin.search_bounds`; spikes: whether the orders of Fig. 9's spikes
-    count; weights: see `twin_objective.misfit`. Raises ConfigError for another line calibration.
+    motion: section of the configuration; trajectories: see `twin.stated`; draws: see `draw`; line_calibration: one of
+    LINE_CALIBRATIONS; of_model: the errors after a calibration are those of the measured points against the calibrated
+    model, not of a robot that is driven again; registered: the tracker's frame is fitted to the commanded points; more:
+    additional effects that are searched, or "spikes", see `twin.search_bounds`; spikes: whether the orders of Fig. 9's
+    spikes count; weights: see `twin_objective.misfit`. Raises ConfigError for another line calibration.
     """
 
     mechanism: Rrru3
@@ -189,7 +189,7 @@ def make_task(campaign, virtual, count, line_calibration, more=()):
     return Task(
         campaign.robot.mechanism,
         virtual["motion"],
-        virtual["trajectories"],
+        stated(virtual["trajectories"]),
         campaign.noise_mm,
         draw(numbered, len(campaign.plan.targets())),
         line_calibration,

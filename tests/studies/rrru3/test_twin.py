@@ -167,6 +167,11 @@ def test_a_settled_twin_is_the_same_robot_on_the_same_path(task):
     assert whole.trajectory_section() == loose.trajectory_section()
 
 
+def test_what_is_searched_is_not_stated(task):
+    section = {shape: CONFIGURED[shape] | CANDIDATE.trajectory_section()[shape] for shape in CONFIGURED}
+    assert twin.stated(section) == CONFIGURED
+
+
 def test_another_line_calibration_is_refused(task):
     with pytest.raises(ConfigError, match="'spiral'; allowed: group_1, lines"):
         replace(task, line_calibration="spiral")
