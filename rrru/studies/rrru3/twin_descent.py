@@ -1,9 +1,9 @@
 """Descent of a candidate for the twin to the nearest optimum: damped Gauss-Newton on the objective's residuals.
 
-The objective is half a sum of squares (see `twin_objective`), and common random numbers make it smooth but for kinks.
-Levenberg-Marquardt (Nocedal and Wright, Numerical Optimization, 2006, chapter 10) with differences over the bounds'
-width comes to an optimum in some hundred candidates. A first descent with a tolerance on every number is broad: far
-from the printed numbers the heavy tails have many optima of their own. Genes are in 0..1.
+The objective is half a sum of squares (see `twin_objective`). Common random numbers make it smooth, with kinks where
+another point has the largest error. Levenberg-Marquardt (Nocedal and Wright, Numerical Optimization, 2006, chapter 10)
+with differences comes to an optimum in some hundred candidates. A first descent with a tolerance on every number is
+broad: far from the printed numbers the heavy tails have many optima of their own. Genes are in 0..1.
 """
 
 import numpy as np
