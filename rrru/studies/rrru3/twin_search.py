@@ -54,9 +54,9 @@ class Spatial:
     def __init__(self, task, twin):
         self.plan, self.mechanism = task.plan(twin), task.mechanism
         self.target = self.plan.targets()
+        self.theta = self.mechanism.require_reachable(self.target)
         self.robot = twin.robot(self.mechanism)
         self.motion = self.robot.motion(self.plan, self.mechanism.inverse)
-        self.theta = self.motion.drive
         self.singularity = np.minimum(*self.mechanism.singularities(self.target, self.theta)[:2])
 
     def attained(self, deviations=None, spikes=0.0):

@@ -210,6 +210,17 @@ def test_a_spiral_near_a_singularity_is_refused(task):
     assert twin_search.cost(list(near.values.values()), task) == 1e6
 
 
+@pytest.mark.parametrize("kind", [twin_search.Spatial, twin_search.Translational])
+def test_a_spiral_out_of_reach_is_refused(task, kind):
+    far = twin.Twin(CANDIDATE.values | {"centre_x_mm": -700.0, "radius_end_mm": 420.0, "turns": 2.5})
+    assert np.isnan(task.mechanism.inverse(task.plan(far).targets())).any()
+    with pytest.raises(UnreachableError):
+        twin_search.simulate(task, far, kind)
+    residuals = twin_search.residuals(list(far.values.values()), task, 0.0)
+    assert np.isnan(residuals).all()
+    assert len(residuals) == len(twin_search.residuals(list(CANDIDATE.values.values()), task, 0.0))
+
+
 def test_the_overlay_is_the_twin_and_the_configured_twin_comes_back():
     overlay = twin.overlay(CANDIDATE)
     robot, own = overlay["virtual_robots"]["twin"], overlay["trajectories"]["paper"]
