@@ -5,12 +5,17 @@ import numpy as np
 
 from rrru.calibration.identifiability import RANK_TOLERANCE
 from rrru.errors import FitError
+from rrru.robots.rrru3_kernels import forward
+from rrru.studies.rrru3.twin_kernels import parameter_jacobian
 
 # weight in mm of the squared excess over a bound, in half widths: violations are some thousandths
 _STIFFNESS = 10.0
 # Newton steps, the smallest tried share of one, and the gain in mm below which a draw is solved
 _MOST_STEPS, _LEAST_SHARE, _LEAST_GAIN_MM = 60, 1e-3, 1e-7
-_LEAST_DISTANCE_MM = 1e-9
+_LEAST_DISTANCE_MM, _LEAST_PIVOT = 1e-9, 1e-14
+
+# sums over points are taken in any order, so that they vectorise
+_vectorised = numba.njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz"})
 
 
 def linear_fit(mechanism, theta, measured, start):
@@ -19,13 +24,11 @@ def linear_fit(mechanism, theta, measured, start):
     The model is linearised once, at the least-squares deviations of the draws' mean. theta, start: (n, 3); measured:
     (d, n, 3). Raises FitError where the iteration leaves the workspace.
     """
-    parameters, centre = mechanism.parameters, measured.mean(axis=0)
-    deviations = parameters.nominal
-    for _ in range(3):
-        residual, jacobian = _linearised(mechanism, theta, centre, start, deviations)
-        step = np.linalg.lstsq(jacobian.reshape(-1, len(deviations)), residual.ravel(), rcond=RANK_TOLERANCE)[0]
-        deviations = np.clip(deviations + step, parameters.low, parameters.high)
-    residual, jacobian = _linearised(mechanism, theta, centre, start, deviations)
+    parameters, model = mechanism.parameters, (mechanism.nominal_legs, mechanism.azimuth_cos_sin, mechanism.leg_map)
+    centre = measured.mean(axis=0)
+    deviations, residual, jacobian = _least_squares(theta, centre, start, model, (parameters.low, parameters.high))
+    if not np.isfinite(residual).all():
+        raise FitError("the candidate's calibration leaves the workspace")
     whitened = np.linalg.qr(jacobian.reshape(-1, len(deviations)))
     back, basis, residual = (
         np.linalg.inv(whitened.R),
@@ -35,54 +38,83 @@ def linear_fit(mechanism, theta, measured, start):
     # place of the deviations within their bounds, in half widths: middle + over q, violated beyond 1
     half = 0.5 * (parameters.high - parameters.low)
     middle, over = (deviations - 0.5 * (parameters.high + parameters.low)) / half, back / half[:, None]
-    start, gram = np.einsum("dna,nap->dp", residual, basis), np.einsum("nap,naq->npq", basis, basis)
-    q, value = _newton(*map(np.ascontiguousarray, (residual, basis, gram, start, over, middle)))
+    start, basis = residual.reshape(len(residual), -1) @ whitened.Q, basis.transpose(2, 1, 0)
+    gram = (basis[:, None] * basis).sum(axis=2)
+    arrays = residual.transpose(0, 2, 1), basis, gram, start, over, middle
+    q, value = _newton(*map(np.ascontiguousarray, arrays))
     return deviations + q @ back.T, value
 
 
-def _linearised(mechanism, theta, measured, start, deviations):
-    """Residuals (n, 3) of measured positions and the model's derivatives (n, 3, p) at deviations."""
-    residual = measured - mechanism.forward(theta, deviations, start)
-    jacobian = mechanism.parameter_jacobian(measured - residual, theta, deviations)
-    if not (np.isfinite(residual).all() and np.isfinite(jacobian).all()):
-        raise FitError("the candidate's calibration leaves the workspace")
-    return residual, jacobian
-
-
 @numba.njit(cache=True)
-def _newton(residual, basis, gram, start, back, middle):
-    """Coordinates q (d, p) that minimise the mean distances of residuals (d, n, 3) - basis (n, 3, p) q, and the minima.
+def _least_squares(theta, measured, start, model, bounds):
+    """Deviations (p,) of least squares, clipped to bounds (low, high), by three steps of Gauss and Newton.
 
-    Damped Newton from least squares, one draw after another; the basis is orthonormal. gram (n, p, p): basis^T basis of
-    every point; middle (p,) + back (p, p) q: place within the bounds, violated beyond 1.
+    With the residuals (n, 3) of measured positions there and the model's derivatives (n, 3, p); residuals are NaN
+    where the iteration leaves the workspace. model: nominal numbers of the legs, their azimuths' cosines and sines, and
+    derivatives of the numbers by the parameters.
     """
-    draws, points, size = residual.shape[0], residual.shape[1], basis.shape[2]
+    nominal, turn, leg_map = model
+    cosine, sine = np.ascontiguousarray(np.cos(theta).T), np.ascontiguousarray(np.sin(theta).T)
+    near, deviations = np.ascontiguousarray(start.T), np.zeros(leg_map.shape[2])
+    for step in range(4):
+        legs = nominal.copy()
+        for p in range(len(deviations)):
+            legs += leg_map[:, :, p] * deviations[p]
+        position = np.ascontiguousarray(forward(legs.reshape(1, 3, 5), turn, cosine, sine, near)[0].T)
+        residual = measured - position
+        jacobian = parameter_jacobian(position, theta, legs, turn, leg_map)
+        flat = jacobian.reshape(-1, len(deviations))
+        if not (np.isfinite(residual).all() and np.isfinite(flat).all()):
+            return deviations, np.full_like(residual, np.nan), jacobian
+        if step < 3:
+            moved = deviations + np.linalg.lstsq(flat, residual.ravel(), RANK_TOLERANCE)[0]
+            deviations = np.minimum(np.maximum(moved, bounds[0]), bounds[1])
+    return deviations, residual, jacobian
+
+
+@_vectorised
+def _newton(residual, basis, gram, start, back, middle):
+    """Coordinates q (d, p) that minimise the mean distances of residuals (d, 3, n) - q basis (p, 3, n), and the minima.
+
+    Damped Newton from least squares, one draw after another; the basis is orthonormal. gram (p, p, n): products of its
+    vectors at every point; middle (p,) + back (p, p) q: place within the bounds, violated beyond 1. The loops over
+    points are the innermost ones.
+    """
+    draws, points, size = residual.shape[0], residual.shape[2], basis.shape[0]
     found, least = start.copy(), np.empty(draws)
-    left, moved, along = np.empty((points, 3)), np.empty((points, 3)), np.empty(size)
-    slope, bend, place, moves = np.empty(size), np.empty((size, size)), np.empty(size), np.empty(size)
+    left, moved, weight, along = (
+        np.empty((3, points)),
+        np.empty((3, points)),
+        np.empty(points),
+        np.empty((size, points)),
+    )
+    slope, step, place, moves = np.empty(size), np.empty(size), np.empty(size), np.empty(size)
+    bend = np.empty((size, size))
     for d in range(draws):
         q = found[d]
-        for n in range(points):
-            for a in range(3):
-                left[n, a] = residual[d, n, a]
-                for p in range(size):
-                    left[n, a] -= basis[n, a, p] * q[p]
+        left[:] = residual[d]
+        _add(left, -q, basis)
         for k in range(size):
             place[k] = middle[k]
             for p in range(size):
                 place[k] += back[k, p] * q[p]
         value = _value(left, moved, 0.0, place, moves)
         for _ in range(_MOST_STEPS):
-            slope[:], bend[:] = 0.0, 0.0
             for n in range(points):
-                weight = 1.0 / max(np.sqrt(left[n, 0] ** 2 + left[n, 1] ** 2 + left[n, 2] ** 2), _LEAST_DISTANCE_MM)
-                for p in range(size):
-                    along[p] = weight * (
-                        left[n, 0] * basis[n, 0, p] + left[n, 1] * basis[n, 1, p] + left[n, 2] * basis[n, 2, p]
-                    )
-                    slope[p] += along[p] / points
-                    for k in range(p + 1):
-                        bend[p, k] += weight * (gram[n, p, k] - along[p] * along[k]) / points
+                size_mm = np.sqrt(left[0, n] ** 2 + left[1, n] ** 2 + left[2, n] ** 2)
+                weight[n] = 1.0 / max(size_mm, _LEAST_DISTANCE_MM)
+            for p in range(size):
+                total = 0.0
+                for n in range(points):
+                    product = left[0, n] * basis[p, 0, n] + left[1, n] * basis[p, 1, n] + left[2, n] * basis[p, 2, n]
+                    along[p, n] = weight[n] * product
+                    total += along[p, n]
+                slope[p] = total / points
+                for k in range(p + 1):
+                    total = 0.0
+                    for n in range(points):
+                        total += weight[n] * (gram[p, k, n] - along[p, n] * along[k, n])
+                    bend[p, k] = total / points
             for k in range(size):
                 excess = place[k] - min(max(place[k], -1.0), 1.0)
                 if excess != 0.0:
@@ -90,15 +122,9 @@ def _newton(residual, basis, gram, start, back, middle):
                         slope[p] -= 2.0 * _STIFFNESS * excess * back[k, p]
                         for m in range(p + 1):
                             bend[p, m] += 2.0 * _STIFFNESS * back[k, p] * back[k, m]
-            for p in range(size):
-                for k in range(p):
-                    bend[k, p] = bend[p, k]
-            step = np.linalg.solve(bend, slope)
-            for n in range(points):
-                for a in range(3):
-                    moved[n, a] = 0.0
-                    for p in range(size):
-                        moved[n, a] += basis[n, a, p] * step[p]
+            _solve(bend, slope, step)
+            moved[:] = 0.0
+            _add(moved, step, basis)
             for k in range(size):
                 moves[k] = 0.0
                 for p in range(size):
@@ -113,25 +139,54 @@ def _newton(residual, basis, gram, start, back, middle):
             for p in range(size):
                 q[p] += share * step[p]
                 place[p] += share * moves[p]
-            for n in range(points):
-                for a in range(3):
-                    left[n, a] -= share * moved[n, a]
+            left -= share * moved
             if gain < _LEAST_GAIN_MM:
                 break
         least[d] = value
     return found, least
 
 
-@numba.njit(cache=True)
-def _value(left, moved, share, place, moves):
-    """Mean distance of residuals left (n, 3) after a share of a step, which changes them by -moved, and the penalty."""
-    total = 0.0
-    for n in range(left.shape[0]):
-        square = 0.0
+@_vectorised
+def _add(vectors, factors, basis):
+    """Add factors (p,) of a basis (p, 3, n) to vectors (3, n), in place."""
+    for p in range(len(factors)):
         for a in range(3):
-            square += (left[n, a] - share * moved[n, a]) ** 2 if share > 0.0 else left[n, a] ** 2
-        total += np.sqrt(square)
-    total /= left.shape[0]
+            for n in range(vectors.shape[1]):
+                vectors[a, n] += factors[p] * basis[p, a, n]
+
+
+@numba.njit(cache=True)
+def _solve(matrix, right, result):
+    """Solution (p,) of a positive definite matrix (p, p), of which the lower half is given, by Cholesky in place."""
+    size = len(right)
+    for p in range(size):
+        for k in range(p + 1):
+            rest = matrix[p, k]
+            for m in range(k):
+                rest -= matrix[p, m] * matrix[k, m]
+            matrix[p, k] = np.sqrt(max(rest, _LEAST_PIVOT)) if k == p else rest / matrix[k, k]
+    for p in range(size):
+        rest = right[p]
+        for m in range(p):
+            rest -= matrix[p, m] * result[m]
+        result[p] = rest / matrix[p, p]
+    for p in range(size - 1, -1, -1):
+        rest = result[p]
+        for m in range(p + 1, size):
+            rest -= matrix[m, p] * result[m]
+        result[p] = rest / matrix[p, p]
+
+
+@_vectorised
+def _value(left, moved, share, place, moves):
+    """Mean distance of residuals left (3, n) after a share of a step, which changes them by -moved, and the penalty."""
+    total = 0.0
+    for n in range(left.shape[1]):
+        x, y, z = left[0, n], left[1, n], left[2, n]
+        if share > 0.0:
+            x, y, z = x - share * moved[0, n], y - share * moved[1, n], z - share * moved[2, n]
+        total += np.sqrt(x * x + y * y + z * z)
+    total /= left.shape[1]
     for k in range(place.shape[0]):
         at = place[k] + share * moves[k] if share > 0.0 else place[k]
         total += _STIFFNESS * (at - min(max(at, -1.0), 1.0)) ** 2

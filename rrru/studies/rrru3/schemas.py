@@ -55,13 +55,13 @@ ended                  str    why the search ended: three restarts agree within 
     time was over {agreed, restarts, time}
 
 ## twin_progress | tables/twin_progress.parquet | restart evaluations
-Progress of these restarts.
+Progress of these restarts: the descents in which the best one improved, and the last.
 --
 restart evaluations objective_nat
 
 ## twin_hypotheses | tables/twin_hypotheses.parquet | hypothesis
-Hypotheses about the paper's campaign and its robot, each searched with the same number of evaluations; `snakemake
---cores 2 twin_hypotheses`.
+Hypotheses about the paper's campaign and its robot, each searched with the same number of evaluations, to the end of a
+descent; `snakemake --cores 2 twin_hypotheses`.
 --
 hypothesis             str    its name
 statement              str    what it says

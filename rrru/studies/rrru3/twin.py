@@ -1,6 +1,7 @@
 """The twin, ONE virtual robot and ONE spiral, as numbers to search and as a configuration. Lengths mm, angles rad."""
 
 from dataclasses import dataclass
+from itertools import groupby
 
 import numpy as np
 import pandas as pd
@@ -70,11 +71,28 @@ _SPIRAL = {
     "radius_mm": ("radius_start_mm", "radius_end_mm"),
     "z_mm": ("z_start_mm", "z_end_mm"),
 }
+# names of one part that differ in more than a number
+_PART = {
+    **{f"{name}{k}": "transmission" for name in ("amplitude", "phase") for k in _LEGS},
+    **{name: "geometry" for name in _GEOMETRY},
+    **{name: "spiral" for names in _SPIRAL.values() for name in names},
+    **{name: "lines" for name in _OFFSETS},
+    "ratio": "transmission",
+    "turns": "spiral",
+    "start_deg": "spiral",
+}
 
 
 def search_bounds(more=()):
     """Bounds (low, high) by name of all searched numbers, with those of additional effects, or "spikes"."""
     return SEARCH_BOUNDS | {name: limits for effect in more for name, limits in _MORE[effect].items()}
+
+
+def parts(names):
+    """Groups of searched names, in their order, that describe one part each: names that differ in a number, the drives'
+    periodic errors, the lines' or the spiral's.
+    """
+    return [list(group) for _, group in groupby(names, lambda name: _PART.get(name, name.rstrip("123")))]
 
 
 @dataclass(frozen=True)
@@ -113,15 +131,29 @@ class Twin:
             {shape: {**configured[shape], **searched[shape]} for shape in ("lines", "spiral")}
         )
 
-    def robot(self, mechanism, kind=VirtualRobot):
+    def robot(self, mechanism):
         """The virtual robot of this candidate."""
         section = self.robot_section()
-        return kind(
+        return VirtualRobot(
             mechanism=mechanism,
             deviations=section["errors"],
             effects=active_effects(section["effects"], Rrru3()),
             non_repeatability_mm=section["wobble_mm"],
         )
+
+
+def stated(section):
+    """The lines and the spiral of a `trajectories:` entry without what is searched."""
+    searched = {"lines": {"offsets_y_mm"}, "spiral": {*_SPIRAL, "turns", "start_deg"}}
+    return {
+        shape: {key: section[shape][key] for key in section[shape].keys() - keys} for shape, keys in searched.items()
+    }
+
+
+def settled(twin):
+    """The same Twin with whole numbers where only these count: the periods a turn and the side."""
+    whole = {"ratio": twin.robot_section()["effects"]["transmission_error"]["ratio"]}
+    return Twin(twin.values | whole | {"side": 1.0 if twin.values["side"] >= 0.0 else -1.0})
 
 
 def from_config(virtual):

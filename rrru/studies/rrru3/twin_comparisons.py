@@ -1,7 +1,8 @@
 """The twin's search again: for hypotheses about the paper and its robot, and with a missed number weighing more.
 
-Hypotheses are searched with the same number of evaluations each. They compete by the objective on draws that the search
-did not use: a difference of 1 nat is a factor of e in the probability of what the paper prints.
+Hypotheses are searched with the same number of evaluations each, to the end of a descent. They compete by the objective
+on draws that the search did not use: a difference of 1 nat is a factor of e in the probability of what the paper
+prints.
 
 A trade-off searches again with a printed number that the twin misses weighing more and more. The number that suffers
 most is the other half of a contradiction: two printed numbers that no candidate found meets together. All start at the

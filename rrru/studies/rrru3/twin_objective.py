@@ -9,6 +9,10 @@ that is printed to +- h and has mean m and standard deviation s over the draws i
 f the density of Student's t with 4 degrees of freedom. Its tails are heavy, so that numbers out of reach do not
 dominate. Of an upper limit and of an order it is -log F of the margin's mean over its standard deviation. The unit is
 nat; it is positive, and 0 would be certainty.
+
+It is a constant and half a sum of squares, which is what a descent needs: with t = (p - m) / sigma of
+
+    sign(t) sqrt(5 log(1 + t^2 / 4)),   sqrt(2 log(sigma sqrt(3) / h)),   sqrt(-2 log F).
 """
 
 import numpy as np
@@ -18,6 +22,12 @@ from rrru.studies.rrru3.paper import ERRORS_MM, TOLERANCE, printed_half_mm
 
 # the least standard deviation over draws: numbers that do not vary at all have a finite probability
 _LEAST_SCATTER = 1e-6
+_PRINTED = np.array(list(ERRORS_MM.values()))
+# half of what is printed to, as a share of it
+_HALF = np.array([printed_half_mm(item) for item in ERRORS_MM]) / np.abs(_PRINTED)
+_LIMITS = np.isin(list(ERRORS_MM), numbers.UPPER_LIMITS)
+# contribution of a number that is met without scatter, -log(2 h f(0) sqrt(3) / h), where f(0) is 3/8
+_LEAST = -np.log(0.75 * np.sqrt(3.0))
 
 
 def misfit(found, orders, weights=None):
@@ -25,25 +35,56 @@ def misfit(found, orders, weights=None):
 
     weights: factors of single contributions by name, 1 for the others.
     """
-    parts = surprises(found, orders)
-    return float(sum((weights or {}).get(name, 1.0) * part for name, part in parts.items()))
+    squares = residuals(found, orders, weights)
+    return float(0.5 * squares @ squares + least(weights))
 
 
 def surprises(found, orders):
     """Contribution in nat of every printed number and of every order to `misfit`, by name."""
-    result = {}
-    for item, printed in ERRORS_MM.items():
-        ratio = np.asarray(found[item]) / printed
-        half = printed_half_mm(item) / abs(printed)
-        spread = np.hypot(max(np.std(ratio, ddof=1), _LEAST_SCATTER), half / np.sqrt(3.0))
-        lack = (1.0 - np.mean(ratio)) / spread
-        if item in numbers.UPPER_LIMITS:
-            result[item] = -_log_t_cdf(lack)
-        else:
-            result[item] = -(_log_t_density(lack) + np.log(2.0 * half / spread))
-    for name, margin in orders.items():
-        result[f"order_{name}"] = -_log_t_cdf(np.mean(margin) / max(np.std(margin, ddof=1), _LEAST_SCATTER))
-    return result
+    off, wide, failing = _roots(found, orders, 0.0)
+    values = 0.5 * (off**2 + wide**2) + np.where(_LIMITS, 0.0, _LEAST)
+    return dict(zip(ERRORS_MM, values, strict=True)) | dict(zip(_names(orders), 0.5 * failing**2, strict=True))
+
+
+def residuals(found, orders, weights=None, tolerance=0.0):
+    """Residuals (m,) of a candidate: half the sum of their squares is `misfit` above its `least` value.
+
+    tolerance: added to the scatter of every number, as a share of what is printed, and of every margin.
+    """
+    off, wide, failing = _roots(found, orders, tolerance)
+    factors = np.sqrt([(weights or {}).get(name, 1.0) for name in (*ERRORS_MM, *ERRORS_MM, *_names(orders))])
+    return factors * np.concatenate([off, wide, failing])
+
+
+def least(weights=None):
+    """The misfit in nat where every number is met without scatter and every order holds for certain."""
+    return sum(_LEAST * (weights or {}).get(item, 1.0) for item in ERRORS_MM if item not in numbers.UPPER_LIMITS)
+
+
+def _names(orders):
+    """Names of the contributions of orders."""
+    return [f"order_{name}" for name in orders]
+
+
+def _roots(found, orders, tolerance):
+    """Residuals of deviations (17,) and widths (17,) of the numbers, and of orders; see above."""
+    mean, scatter = _moments(np.array([found[item] for item in ERRORS_MM]) / _PRINTED[:, None])
+    spread = np.hypot(np.hypot(scatter, _HALF / np.sqrt(3.0)), tolerance)
+    lack = (1.0 - mean) / spread
+    off = np.sign(lack) * np.sqrt(5.0 * np.log1p(0.25 * lack**2))
+    off[_LIMITS] = [np.sqrt(-2.0 * _log_t_cdf(value)) for value in lack[_LIMITS]]
+    # rounding: no scatter at all
+    wide = np.where(_LIMITS, 0.0, np.sqrt(np.maximum(2.0 * np.log(spread * np.sqrt(3.0) / _HALF), 0.0)))
+    if not orders:
+        return off, wide, np.empty(0)
+    mean, scatter = _moments(np.array(list(orders.values())))
+    margins = mean / np.hypot(scatter, tolerance)
+    return off, wide, np.sqrt([-2.0 * _log_t_cdf(value) for value in margins])
+
+
+def _moments(values):
+    """Means and standard deviations of draws (n, d)."""
+    return values.mean(axis=1), np.maximum(values.std(axis=1, ddof=1), _LEAST_SCATTER)
 
 
 def draw_misfit(found, orders):
@@ -58,11 +99,6 @@ def draw_misfit(found, orders):
         off = max(deviation, 0.0) if item in numbers.UPPER_LIMITS else deviation
         total += np.log1p((off / TOLERANCE) ** 2)
     return float(total + np.log(2.0) * sum(margin <= 0.0 for margin in orders.values()))
-
-
-def _log_t_density(t):
-    """Log density of Student's t with 4 degrees of freedom."""
-    return np.log(0.375) - 2.5 * np.log1p(0.25 * t * t)
 
 
 def _log_t_cdf(t):

@@ -8,12 +8,13 @@ import pytest
 
 from rrru.calibration.calibrate import calibrate
 from rrru.calibration.mean_distance import least_mean_distance
+from rrru.effects import backlash
 from rrru.errors import ConfigError, UnreachableError
 from rrru.estimation.observations.target_positions import TargetPositions
 from rrru.robots.catalogue import make_mechanism
 from rrru.robots.rrru3 import Rrru3
-from rrru.simulation.virtual_robot import VirtualRobot
 from rrru.studies.rrru3 import twin, twin_search
+from rrru.studies.rrru3 import twin_kernels as kernels
 from rrru.studies.rrru3.linear_fit import linear_fit
 from rrru.studies.rrru3.paper import ERRORS_MM
 
@@ -40,7 +41,7 @@ def task():
 def test_the_fast_path_gives_the_spatial_closures_numbers(task, line_calibration):
     task = replace(task, line_calibration=line_calibration)
     fast, fast_orders = twin_search.simulate(task, CANDIDATE)
-    full, full_orders = twin_search.simulate(task, CANDIDATE, kind=VirtualRobot)
+    full, full_orders = twin_search.simulate(task, CANDIDATE, kind=twin_search.Spatial)
     assert set(fast) == set(ERRORS_MM)
     for some, others in ((fast, full), (fast_orders, full_orders)):
         assert all(one == pytest.approx(others[item], abs=0.05) for item, one in some.items())
@@ -56,13 +57,47 @@ def test_many_draws_at_once_are_each_draws_own(task):
         assert all(values[k] == pytest.approx(own[item][0], abs=0.06) for item, values in orders.items())
 
 
-def test_the_members_forces_are_those_of_the_full_motion(task):
-    plan, mechanism = task.plan(CANDIDATE), task.mechanism
-    fast, full = (
-        CANDIDATE.robot(mechanism, kind).motion(plan, mechanism.inverse)
-        for kind in (twin_search.TranslationalRobot, VirtualRobot)
+def test_the_compiled_campaign_is_the_plans(task):
+    fast, full = (kind(task, CANDIDATE) for kind in (twin_search.Translational, twin_search.Spatial))
+    np.testing.assert_allclose(fast.target, full.target, atol=1e-9)
+    np.testing.assert_allclose(fast.theta, full.theta, atol=1e-12)
+    np.testing.assert_allclose(fast.singularity, full.singularity, atol=1e-7)
+    acceleration = full.robot.course(full.plan, task.mechanism.inverse).acceleration_mm_s2
+    np.testing.assert_allclose(task.course(CANDIDATE)[1], acceleration, atol=0.1)
+    # commands that a calibration corrects, too
+    deviations = np.array([0.004, -0.003, 0.002, 0.8, -0.2, 0.4, -0.6])
+    for corrected in (None, deviations):
+        (attained, drive), (other, same) = (one.attained(corrected) for one in (fast, full))
+        np.testing.assert_allclose(drive, same, atol=1e-12)
+        # clearance to first order; at the lines' start the robot is near a singularity
+        assert np.linalg.norm(attained - other, axis=1).max() < 0.05
+
+
+def test_the_compiled_backlash_is_that_of_a_fine_path():
+    # drives that turn back between two points, and a corner
+    def along(count):
+        time = np.linspace(0.0, 1.0, count)
+        wave = np.stack([np.sin(7.0 * time), np.cos(5.0 * time), time], axis=1)
+        return np.concatenate([wave, wave[-1] + np.linspace(0.0, 1.0, count)[1:, None] * [0.5, -0.3, -0.4]])
+
+    coarse, width = along(81), np.array([0.1, 0.3, 0.2])
+    smooth = np.ones(len(coarse), dtype=bool)
+    smooth[[0, 80, -1]] = False
+    fine = backlash.play(along(8001), 0.5 * width)[::100]
+    np.testing.assert_allclose(kernels.backlash(coarse, smooth, width), fine, atol=1e-5)
+    assert abs(backlash.play(coarse, 0.5 * width) - fine).max() > 1e-4
+
+
+def test_the_compiled_jacobian_is_the_mechanisms(rich_poses):
+    points, theta = rich_poses
+    robot = Rrru3()
+    deviations = np.array([0.004, -0.003, 0.002, 0.8, -0.2, 0.4, -0.6])
+    legs = robot.numbers(deviations)
+    compiled = kernels.parameter_jacobian(points, theta, legs, robot.azimuth_cos_sin, robot.leg_map)
+    np.testing.assert_allclose(compiled, robot.parameter_jacobian(points, theta, deviations), rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(
+        kernels.inverse(points, legs, robot.azimuth_cos_sin), robot.inverse(points, deviations), atol=1e-12
     )
-    np.testing.assert_allclose(fast.force_n, full.force_n, atol=1e-6)
 
 
 def test_errors_of_the_model_are_the_residuals_of_its_fit(task):
@@ -124,6 +159,19 @@ def test_a_ratio_at_its_lower_bound_is_one_period_a_turn():
     assert lowest.robot_section()["effects"]["transmission_error"]["ratio"] == 1.0
 
 
+def test_a_settled_twin_is_the_same_robot_on_the_same_path(task):
+    loose = twin.Twin(CANDIDATE.values | {"ratio": 6.3, "side": -0.2})
+    whole = twin.settled(loose)
+    assert whole.values["ratio"] == 6.0 and whole.values["side"] == -1.0
+    assert whole.robot_section() == loose.robot_section()
+    assert whole.trajectory_section() == loose.trajectory_section()
+
+
+def test_what_is_searched_is_not_stated(task):
+    section = {shape: CONFIGURED[shape] | CANDIDATE.trajectory_section()[shape] for shape in CONFIGURED}
+    assert twin.stated(section) == CONFIGURED
+
+
 def test_another_line_calibration_is_refused(task):
     with pytest.raises(ConfigError, match="'spiral'; allowed: group_1, lines"):
         replace(task, line_calibration="spiral")
@@ -160,6 +208,17 @@ def test_a_spiral_near_a_singularity_is_refused(task):
     with pytest.raises(UnreachableError):
         twin_search.simulate(task, near)
     assert twin_search.cost(list(near.values.values()), task) == 1e6
+
+
+@pytest.mark.parametrize("kind", [twin_search.Spatial, twin_search.Translational])
+def test_a_spiral_out_of_reach_is_refused(task, kind):
+    far = twin.Twin(CANDIDATE.values | {"centre_x_mm": -700.0, "radius_end_mm": 420.0, "turns": 2.5})
+    assert np.isnan(task.mechanism.inverse(task.plan(far).targets())).any()
+    with pytest.raises(UnreachableError):
+        twin_search.simulate(task, far, kind)
+    residuals = twin_search.residuals(list(far.values.values()), task, 0.0)
+    assert np.isnan(residuals).all()
+    assert len(residuals) == len(twin_search.residuals(list(CANDIDATE.values.values()), task, 0.0))
 
 
 def test_the_overlay_is_the_twin_and_the_configured_twin_comes_back():

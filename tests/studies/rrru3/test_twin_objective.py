@@ -40,6 +40,22 @@ def test_the_objective_is_minus_the_log_probability_of_what_is_printed():
         assert twin_objective._log_t_cdf(t) == pytest.approx(student.logcdf(t, 4), rel=1e-6)
 
 
+def test_the_residuals_are_the_objective_and_a_tolerance_is_more_scatter():
+    orders = {"centre_before": np.linspace(-0.1, 0.3, 40), "links": np.linspace(-0.9, -0.8, 40)}
+    for weights in (None, {"lines_after_max": 4.0, LIMIT: 2.0, "order_links": 16.0}):
+        squares = twin_objective.residuals(drawn(), orders, weights)
+        objective = 0.5 * (squares**2).sum() + twin_objective.least(weights)
+        assert objective == pytest.approx(twin_objective.misfit(drawn(), orders, weights))
+    # met without scatter, by SciPy: twice half a digit over the rectangle's standard deviation
+    assert twin_objective.least() == pytest.approx(-16.0 * np.log(2.0 * np.sqrt(3.0) * student.pdf(0.0, 4)))
+    # a deviation of 5 % where numbers scatter by 1 % and 10 %
+    exact = {item: value * np.linspace(0.999, 1.001, 40) for item, value in ERRORS_MM.items()}
+    off = exact | {"lines_after_max": 1.05 * exact["lines_after_max"]}
+    place = list(ERRORS_MM).index("lines_after_max")
+    near, far = (twin_objective.residuals(off, {}, tolerance=tolerance)[place] for tolerance in (0.1, 0.0))
+    assert near == pytest.approx(-np.sqrt(5.0 * np.log1p(0.25 * 0.5**2)), rel=0.01) and far < 5.0 * near
+
+
 def test_half_a_printed_digit():
     halves = {
         "group1_before_min": 0.0005,

@@ -10,8 +10,10 @@ from rrru.studies.rrru3 import twin, twin_restarts, twin_search
 from rrru.studies.rrru3.schemas import TABLES
 from tests.studies.rrru3.test_twin import CANDIDATE, CONFIGURED, MOTION
 
-SECTION = {"seed": 3, "share": 0.02, "spread": 0.1, "candidates": 5, "population": 6, "stall_generations": 50}
-SECTION |= {"stall_nat": 0.1, "evaluations": 25, "restarts": 2, "hours": 1.0, "hypotheses": {}}
+SECTION = {"seed": 3, "share": 0.02, "candidates": 2, "members": 3, "stall_descents": 50, "stall_nat": 0.1}
+SECTION |= {"evaluations": 350, "restarts": 2, "hours": 1.0, "hypotheses": {}}
+
+pytestmark = pytest.mark.usefixtures("short_descents")
 
 
 @pytest.fixture(scope="module")
@@ -21,7 +23,7 @@ def task():
 
 
 @pytest.fixture(scope="module")
-def whole(task):
+def whole(task, short_descents):
     return twin_restarts.search(task, SECTION, CANDIDATE)
 
 
@@ -35,8 +37,7 @@ def test_the_same_seed_gives_the_same_restarts_on_any_number_of_processes(task, 
     assert [one.best for one in other] != [one.best for one in whole[0]]
 
 
-def test_an_interrupted_search_ends_with_the_bytes_of_an_uninterrupted_one(task, whole, tmp_path, monkeypatch):
-    monkeypatch.setattr(twin_restarts, "_SAVED_EVERY", 1)
+def test_an_interrupted_search_ends_with_the_bytes_of_an_uninterrupted_one(task, whole, tmp_path):
     path, direct = tmp_path / "state.json", tmp_path / "direct.json"
     twin_restarts.search(task, SECTION, CANDIDATE, path=direct)
     for _ in range(20):
@@ -54,7 +55,7 @@ def test_an_interrupted_search_ends_with_the_bytes_of_an_uninterrupted_one(task,
 
 def test_the_state_of_another_search_is_not_continued(task, tmp_path):
     path = tmp_path / "state.json"
-    few = SECTION | {"restarts": 1, "evaluations": 6}
+    few = SECTION | {"restarts": 1, "evaluations": 100}
     first, _ = twin_restarts.search(task, few, CANDIDATE, path=path)
     other, _ = twin_restarts.search(replace(task, of_model=True), few, CANDIDATE, path=path)
     same(other, twin_restarts.search(replace(task, of_model=True), few, CANDIDATE)[0])
@@ -74,7 +75,7 @@ def test_the_best_stays_in_its_bounds_and_the_progress_never_rises(task, whole):
 
 
 def test_a_search_about_a_twin_is_never_worse_than_it(task):
-    far = SECTION | {"share": 0.5, "evaluations": 7, "restarts": 1}
+    far = SECTION | {"share": 0.5, "evaluations": 100, "restarts": 1}
     restarts, _ = twin_restarts.search(task, far, CANDIDATE)
     assert restarts[0].best <= twin_search.cost(list(CANDIDATE.values.values()), task) < twin_search.WORST
 
@@ -92,7 +93,7 @@ def test_the_search_ends_where_three_restarts_agree_or_with_its_time(task, whole
         made = []
         for best in bests:
             restart = twin_restarts.Restart(task, SECTION, 0, CANDIDATE)
-            restart.best, restart.stopped = best, "stalled"
+            restart.objectives, restart.stopped = [best], "stalled"
             made.append(restart)
         return twin_restarts._ended(made, SECTION | {"restarts": restarts}, hours)
 
@@ -100,3 +101,58 @@ def test_the_search_ends_where_three_restarts_agree_or_with_its_time(task, whole
     assert ended(90.0, 95.0, 90.8, 90.3) == "agreed"
     assert ended(90.0, 95.0, 91.0, 90.3) == ""
     assert ended(90.0, hours=1.0) == "time" and ended(90.0, 95.0, restarts=2) == "restarts"
+
+
+def test_a_restart_holds_the_best_of_every_optimum_and_never_one_twice(task):
+    restart = twin_restarts.Restart(task, SECTION, 0)
+    size = len(twin.SEARCH_BOUNDS)
+    at = {place: np.full(size, place) for place in (0.1, 0.3, 0.5, 0.7, 0.9)}
+    for place, objective in ((0.1, 95.0), (0.5, 90.0), (0.9, 93.0)):
+        restart._hold(at[place], objective)
+    assert restart.objectives == [90.0, 93.0, 95.0]
+    # the same optimum, better and worse; another one that is better than the worst, and one that is not
+    restart._hold(at[0.9] + 0.01, 92.0)
+    restart._hold(at[0.5] - 0.01, 91.0)
+    restart._hold(at[0.3], 94.0)
+    restart._hold(at[0.7], 99.0)
+    assert restart.objectives == [90.0, 92.0, 94.0]
+    np.testing.assert_allclose(restart.genes[:, 0], [0.5, 0.91, 0.3])
+    # an angle that comes round is near on the other side
+    turned = at[0.3].copy()
+    turned[restart.periodic] += 0.69
+    low = at[0.3].copy()
+    low[restart.periodic] -= 0.29
+    assert abs(restart._apart(turned, low)).max() == pytest.approx(0.02)
+
+
+def test_children_of_a_kind_and_the_best_of_them(task):
+    restart = twin_restarts.Restart(task, SECTION | {"candidates": 20}, 0)
+    names, held = list(twin.SEARCH_BOUNDS), (0.25, 0.5, 0.75)
+    for place in held:
+        restart._hold(np.full(len(names), place), place)
+    groups = twin.parts(names)
+    assert [name for group in groups for name in group] == names
+
+    def children(kind):
+        seen = []
+
+        def rate(genes, tolerance):
+            assert tolerance > 0.0
+            seen.append(genes)
+            return np.arange(len(genes))[::-1, None] - 0.0
+
+        restart.descents = kind
+        best = restart._child(rate)
+        np.testing.assert_array_equal(best, seen[0][-1])
+        return [dict(zip(names, child, strict=True)) for child in seen[0]]
+
+    for child in children(0):
+        assert all(len({child[name] for name in group}) == 1 for group in groups)
+        assert len(set(child.values())) == 2 and set(child.values()) <= set(held)
+    drawn = [[group for group in groups if not {child[name] for name in group} <= set(held)] for child in children(1)]
+    assert all(len(part) == 1 for part in drawn) and len({str(part) for part in drawn}) == 1
+    # of one from another, all genes alike by the share of a difference
+    for child in children(2):
+        assert len({round(child[name], 9) for name in names if name not in twin.PERIODIC}) == 1
+    (changed,) = children(3)
+    assert 0.0 < min(abs(changed["dL1"] - place) for place in held) < 0.5
