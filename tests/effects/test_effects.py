@@ -80,7 +80,7 @@ def test_the_library_holds_the_robots_effects_in_their_order():
     assert tuple(EFFECTS) == _NAMES
     assert tuple(name for name in NAMES if name in EFFECTS) == _NAMES
     others = {"drive_error_function", "transmission_orders", "read_before_rest", "thermal_expansion", "link_growth"}
-    others.add("zero_drift")
+    others |= {"zero_drift", "gain_error"}
     assert set(NAMES) - set(EFFECTS) - set(SLIDER_EFFECTS) == {"tool_offset", "cross_compliance"} | others
 
 
