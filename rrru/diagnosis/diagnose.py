@@ -146,8 +146,7 @@ def diagnose(
     worst = worst_spot(problem.motion.position_mm[problem.at][problem.on_robot], residual[problem.on_robot])
     excluded = left_out(problem, near)
     numbers = parameter_rows(inference)
-    row = _row(inference, verdict, steps, worst, further, (robot.noise_mm, excluded))
-    row |= {"where": where(inference, verdict.effects, numbers)}
+    row = _row(inference, verdict, steps, worst, further, (robot.noise_mm, excluded, numbers))
     ranked = further.runs.assign(rank=np.arange(1, len(further.runs) + 1))
     tables = {"gap_budget": parts, "gap_next_runs": ranked, "gap_next_poses": further.poses, "gap_left_out": excluded}
     tables["gap_parameters"] = numbers
@@ -198,13 +197,13 @@ def _row(
     steps: Sequence[ShrinkStep],
     worst_mm: FloatArray,
     further: Advice,
-    noise_and_excluded: tuple[float | None, pd.DataFrame],
+    about: tuple[float | None, pd.DataFrame, pd.DataFrame],
 ) -> Row:
-    """The row of `gap_verdicts` without the campaign and the sites.
+    """The row of `gap_verdicts` without the campaign.
 
-    noise_and_excluded: the stated noise in mm and the rows of `gap_left_out`.
+    about: the stated noise in mm, the rows of `gap_left_out` and those of `gap_parameters`.
     """
-    stated_mm, excluded = noise_and_excluded
+    stated_mm, excluded, numbers = about
     found = [] if verdict.no_answer else _found(inference)
     problem, noise = inference.problem, inference.problem.noise or NoiseModel.white(inference.problem.noise_mm)
     return {
@@ -212,7 +211,7 @@ def _row(
         "unnamed": "+".join(t.effect for t in inference.hypothesis.terms if t.effect not in verdict.effects),
         "probability": verdict.probability,
         "leg": verdict.leg,
-        "where": "",
+        "where": where(inference, verdict.effects, numbers),
         "confounded_with": ", ".join(verdict.confounded_with),
         "groups": "; ".join(" | ".join(group.names) for group in verdict.groups),
         "searches_apart": inference.posterior.apart,

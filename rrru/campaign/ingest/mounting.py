@@ -320,7 +320,7 @@ def _by_zeros(
     """What ordinary zero offsets of the K drives move the found place of each reflector by, (K, 3) in mm, by its name.
 
     The places, and the frame where it is registered, take over a part of what a zero offset moves the reflectors by:
-    its least squares fit. What is left of all zero offsets makes the residual, which shows how large they are, if they
+    its least squares fit. The rest of all zero offsets makes the residual, which shows how large they are, if they
     are alike. Of the last drive of a chain nothing is left, as it moves the platform alike in all poses: no reading
     tells its zero from the reflectors' places.
 

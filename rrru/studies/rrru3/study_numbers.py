@@ -56,7 +56,7 @@ def study_numbers(trajectory, before_mm, under_lines_mm, under_spiral_mm):
 
 
 def _ends(low, high):
-    """The least of values (..., n) and the largest of others; what is NaN is left out."""
+    """The least of values (..., n) and the largest of others; NaN values are left out."""
     return np.fmin.reduce(low, axis=-1), np.fmax.reduce(high, axis=-1)
 
 

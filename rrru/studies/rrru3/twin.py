@@ -143,7 +143,7 @@ class Twin:
 
 
 def stated(section):
-    """The lines and the spiral of a `trajectories:` entry without what is searched."""
+    """The lines and the spiral of a `trajectories:` entry without the searched numbers."""
     searched = {"lines": {"offsets_y_mm"}, "spiral": {*_SPIRAL, "turns", "start_deg"}}
     return {
         shape: {key: section[shape][key] for key in section[shape].keys() - keys} for shape, keys in searched.items()

@@ -8,7 +8,7 @@ broad: far from the printed numbers the heavy tails have many optima of their ow
 
 import numpy as np
 
-# of the first descent, added to a number's scatter as a share of what is printed
+# of the first descent, added to a number's scatter as a share of the printed number
 TOLERANCE = 0.1
 # most steps with it and without it, and the gain in nat below which two steps in a row end a descent
 _STEPS, _LEAST_GAIN = (8, 20), 0.2

@@ -23,7 +23,7 @@ from rrru.studies.rrru3.paper import ERRORS_MM, TOLERANCE, printed_half_mm
 # the least standard deviation over draws: numbers that do not vary at all have a finite probability
 _LEAST_SCATTER = 1e-6
 _PRINTED = np.array(list(ERRORS_MM.values()))
-# half of what is printed to, as a share of it
+# half of the last printed digit, as a share of the number
 _HALF = np.array([printed_half_mm(item) for item in ERRORS_MM]) / np.abs(_PRINTED)
 _LIMITS = np.isin(list(ERRORS_MM), numbers.UPPER_LIMITS)
 # contribution of a number that is met without scatter, -log(2 h f(0) sqrt(3) / h), where f(0) is 3/8
@@ -49,7 +49,7 @@ def surprises(found, orders):
 def residuals(found, orders, weights=None, tolerance=0.0):
     """Residuals (m,) of a candidate: half the sum of their squares is `misfit` above its `least` value.
 
-    tolerance: added to the scatter of every number, as a share of what is printed, and of every margin.
+    tolerance: added to the scatter of every number, as a share of the printed number, and of every margin.
     """
     off, wide, failing = _roots(found, orders, tolerance)
     factors = np.sqrt([(weights or {}).get(name, 1.0) for name in (*ERRORS_MM, *ERRORS_MM, *_names(orders))])
