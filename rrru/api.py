@@ -32,6 +32,7 @@ from rrru.diagnosis.diagnose import Diagnosis as CoreDiagnosis
 from rrru.diagnosis.verdict_text import NOT_CORRECTED
 from rrru.errors import ConfigError, IngestError, RrruError, not_a_file
 from rrru.figures.drawing import draw, draw_all
+from rrru.figures.files import figure_paths, with_svg
 from rrru.kinematics.robot import Robot
 from rrru.pipeline import config as parts
 from rrru.pipeline import setup
@@ -46,7 +47,6 @@ from rrru.pipeline.jobs.outputs import (
     GAP_FIGURES,
     GAP_TABLES,
     READ_TABLES,
-    figure_paths,
     part_path,
 )
 from rrru.pipeline.read_config import check_config, merged, read_config
@@ -294,11 +294,14 @@ class DiagnosisResult:
         lost = self.result.verdict["not_in_model"]
         return lost if lost.startswith(NOT_CORRECTED) else ""
 
-    def write(self, folder: str | Path) -> Path:
+    def write(self, folder: str | Path, figures: Sequence[str] = ()) -> Path:
         """Write page, JSON, tables, figures and corrected file of the campaign into a folder of results.
 
-        Returns the path of the page. A page of the workflow for the same campaign and configuration has the same bytes.
+        figures: kinds of the figures' files besides SVG, "pdf" and "png"; a figure that is too large for the page as
+        SVG is a PNG there. Returns the path of the page. A page of the workflow for the same campaign and configuration
+        has the same bytes. Raises ConfigError for another kind.
         """
+        kinds = with_svg(figures)
         name, config, folder = self.campaign.name, self.campaign.config, Path(folder)
         paths = _paths(folder, name, config)
         read_job.write(self._read_settings, self.campaign.frames, paths)
@@ -310,8 +313,8 @@ class DiagnosisResult:
         settings = parts.calibration_settings(config, name, driven=True)
         compensate_job.write(compensate_job.compensate(settings, frames | genetic), paths)
         done = self._corrected(paths["corrected"]) if "corrected" in paths else self
-        diagnose_job.write(self._settings, done.result, self._robot, paths)
-        draw_all(CAMPAIGN_FIGURES, paths, parts.figure_options(config, name), paths)
+        diagnose_job.write(self._settings, done.result, self._robot, paths, kinds)
+        draw_all(CAMPAIGN_FIGURES, paths, parts.figure_options(config, name), paths, kinds)
         target = Path(folder, "campaigns", name, "report.html")
         page.write(str(folder), str(target), "", name)
         return target

@@ -81,6 +81,8 @@ def _parser() -> argparse.ArgumentParser:
     one = _command(commands, "diagnose", _diagnose, about, _campaign)
     one.add_argument("--out", default="results", metavar="FOLDER", help="folder of results; default: %(default)s")
     one.add_argument("--effects", type=_names, metavar="NAME,..", help="effects that may act; default: all")
+    about = "files of the figures besides SVG: pdf, png"
+    one.add_argument("--figures", type=_names, default=(), metavar="KIND,..", help=about)
     one.add_argument("--json", action="store_true", help="print the answer as JSON")
     about = "what is in a file: its columns, what is missing, what a run would refuse, and a section to paste"
     _command(commands, "check", _check, about, _campaign)
@@ -239,6 +241,7 @@ def _diagnose(options: argparse.Namespace) -> int:
     """Read, calibrate and diagnose a campaign; write its results and print the answer."""
     first = "rrru.api" not in sys.modules
     from rrru import api
+    from rrru.figures.files import with_svg
 
     if first:
         # modules stay: a garbage collector that looks through them again and again takes a tenth of the time
@@ -249,9 +252,10 @@ def _diagnose(options: argparse.Namespace) -> int:
         raise ConfigError(f"no robot is stated; allowed: --robot with a URDF or MJCF file, or one of {known}")
     campaign = api.configured_campaign(name, config)
     _require_writable(Path(options.out))
+    kinds = with_svg(options.figures)
     shown = sys.stderr.isatty()
     diagnosis = api.diagnose(campaign, effects=options.effects, progress=shown)
-    page = diagnosis.write(options.out)
+    page = diagnosis.write(options.out, kinds)
     if options.json:
         print(page.with_name("verdict.json").read_text(encoding="utf-8"), end="")
     else:

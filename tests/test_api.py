@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 
 import rrru
 from rrru import api
+from rrru.figures import files
 from rrru.pipeline.read_config import DEFAULTS, read_config
 from tests.places import DATA, ROOT
 
@@ -171,10 +172,18 @@ def test_a_zero_that_is_off_is_found_and_the_corrected_file_holds_it(arm, tmp_pa
     assert np.sqrt((left**2).sum(axis=1).mean()) < NOISE_MM
 
 
-def test_what_a_result_writes_is_what_it_holds(arm, tmp_path):
+@pytest.mark.parametrize("largest", [None, 100])
+def test_what_a_result_writes_is_what_it_holds(arm, tmp_path, monkeypatch, largest):
+    if largest:
+        monkeypatch.setattr(files, "LARGEST_SVG", largest)
     campaign = rrru.read_campaign(_measured(arm, np.random.default_rng(5)), arm, noise_mm=NOISE_MM, name="arm")
     diagnosis = rrru.diagnose(campaign, effects=["drive_compliance"])
     page = diagnosis.write(tmp_path)
+    # a page shows a figure that is too large for it as PNG, whatever was asked for
+    kinds = {place.suffix for place in (tmp_path / "figures/arm").iterdir()}
+    assert kinds == ({".svg", ".png"} if largest else {".svg"})
+    assert (b"data:image/png" in page.read_bytes()) is bool(largest)
+    assert diagnosis.write(tmp_path / "all", ("pdf", "png")).read_bytes() == page.read_bytes()
     for name in ("gap_budget", "gap_parameters", "gap_attribute"):
         stored = pd.read_parquet(page.with_name(f"{name}.parquet"))
         pd.testing.assert_frame_equal(stored, diagnosis.tables[name][stored.columns].reset_index(drop=True))

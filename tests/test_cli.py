@@ -43,8 +43,11 @@ def test_a_diagnosis_prints_its_answer_and_where_its_files_are(tmp_path, capsys)
     arguments = ("data/field_12.csv", "--robot", "rrru3", "--noise", "0.02", "--set", "platform_mass_kg=3.0")
     # two that can be tested and two that this file cannot show
     arguments += ("--effects", "backlash,thermal_growth,read_before_rest,thermal_expansion")
-    code, out, _ = ran(capsys, "diagnose", *arguments, "--out", tmp_path)
+    code, out, _ = ran(capsys, "diagnose", *arguments, "--out", tmp_path, "--figures", "pdf")
     folder = tmp_path / "campaigns/field_12"
+    drawn = tmp_path / "figures/field_12"
+    figures = [place.stem for place in drawn.glob("*.svg")]
+    assert len(figures) > 3 and sorted(place.stem for place in drawn.glob("*.pdf")) == sorted(figures)
     facts = json.loads((folder / "verdict.json").read_text())
     said = " ".join(out.split())
     assert code == cli.DONE and all(" ".join(sentence.split()) in said for sentence in facts["sentences"])
@@ -53,6 +56,8 @@ def test_a_diagnosis_prints_its_answer_and_where_its_files_are(tmp_path, capsys)
     assert f"page: {folder / 'report.html'}" in out and (folder / "report.html").is_file() and "\033" not in out
     code, out, _ = ran(capsys, "diagnose", *arguments, "--out", tmp_path, "--json")
     assert code == cli.DONE and json.loads(out) == facts
+    # those of the run before would be figures of other results
+    assert not [*drawn.glob("*.pdf")] and sorted(place.stem for place in drawn.glob("*.svg")) == sorted(figures)
 
 
 def test_robots_and_effects_are_listed(capsys):
@@ -70,6 +75,11 @@ def test_robots_and_effects_are_listed(capsys):
         (("diagnose", "data/field_12.csv", "--robot", "rrru3", "--noise", "0"), cli.WRONG, "0, which no instrument"),
         (("diagnose", "data/field_12.csv", "--robot", "rrru3", "--effects", "backlsh"), cli.WRONG, "mean backlash?"),
         (("diagnose", "data/field_12.csv"), cli.WRONG, "no robot is stated"),
+        (
+            ("diagnose", "data/field_12.csv", "--robot", "rrru3", "--figures", "gif"),
+            cli.WRONG,
+            "figures as gif: no such files; allowed: pdf, png",
+        ),
         (("diagnose", "data/field_12.csv", "--robot", "x.urdf"), cli.WRONG, "robot 'x.urdf': there is no such file"),
         (("diagnose", "README.md", "--robot", "rrru3"), cli.REFUSED, "README.md"),
         (("diagnose", "data/field_12.csv", "--robot", "rrru3", "--noise", "-1"), cli.WRONG, "noise_mm: -1.0"),

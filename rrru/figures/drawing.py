@@ -2,21 +2,31 @@
 
 import importlib
 import inspect
+from pathlib import Path
 
 from rrru.figures import style
+from rrru.figures.files import KINDS, fits_page
 from rrru.store import tables
 
 
-def draw_all(figures, paths, options, outputs):
-    """Draw figures {name: ("module:function", names of its tables)} to outputs["{name}_{kind}"] of `style.KINDS`.
+def draw_all(figures, paths, options, outputs, kinds=KINDS):
+    """Draw figures {name: ("module:function", names of its tables)} to outputs["{name}_{kind}"] of `KINDS`.
 
-    paths: the tables' paths by name; options: of all figures, see their functions. The docstring of a figure's function
-    is its caption in all files.
+    paths: the tables' paths by name; options: of all figures, see their functions; kinds: of the files, "svg" among
+    them. A figure whose SVG is too large for a page has a PNG whatever the kinds; files of other kinds that an earlier
+    run left are removed. The docstring of a figure's function is its caption in all files.
     """
     for name, (place, needed) in figures.items():
         figure = draw(place, {table: tables.read(paths[table]) for table in needed}, options)
-        files = {kind: outputs[f"{name}_{kind}"] for kind in style.KINDS}
-        style.save(figure, files, inspect.cleandoc(_function(place).__doc__))
+        files = {kind: outputs[f"{name}_{kind}"] for kind in KINDS}
+        caption = inspect.cleandoc(_function(place).__doc__)
+        style.save(figure, {kind: files[kind] for kind in kinds}, caption)
+        others = set(KINDS) - set(kinds)
+        if "png" in others and not fits_page(files["svg"]):
+            style.save(figure, {"png": files["png"]}, caption)
+            others.remove("png")
+        for kind in others:
+            Path(files[kind]).unlink(missing_ok=True)
 
 
 def draw(place, frames, options):

@@ -7,15 +7,9 @@ in grey and in marker.
 from contextlib import contextmanager
 from functools import wraps
 from textwrap import fill
-from types import SimpleNamespace
 
 import numpy as np
-from fontTools.ttLib import registerCustomTableClass
-from fontTools.ttLib.tables.otBase import BaseTTXConverter
 from matplotlib import style
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.backends.backend_pdf import FigureCanvasPdf
-from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
@@ -24,15 +18,6 @@ from rrru.store.atomic_write import whole
 SINGLE_MM, DOUBLE_MM = 85.0, 175.0
 _MM_PER_INCH = 25.4
 _DPI = 200
-# files of a figure: what draws them, the entry that would hold a date or a version, and the one for the caption
-KINDS = {
-    "pdf": (FigureCanvasPdf, "CreationDate", "Subject"),
-    "png": (FigureCanvasAgg, "Software", "Description"),
-    "svg": (FigureCanvasSVG, "Date", "Description"),
-}
-# tables of kerning and ligatures: a PDF holds text that is laid out already, and a subset of them takes longer than the
-# glyphs themselves
-_LAYOUT_TABLES = ("GDEF", "GPOS", "GSUB")
 # characters in a line of a legend that stands in a panel's place
 _NARROW = 24
 
@@ -73,23 +58,6 @@ _STYLE = {
     # names inside of a file: by what it draws, not by chance
     "svg.hashsalt": "rrru",
 }
-
-
-class UnusedTable(BaseTTXConverter):
-    """A layout table that a subset of its font, embedded in a PDF, goes without."""
-
-    def decompile(self, _data, _font):
-        """Read nothing: fontTools looks at the version and at `LookupList` of every layout table before it prunes."""
-        self.table = SimpleNamespace(Version=0)
-
-    def prune_pre_subset(self, _font, _options):
-        """Whether fontTools keeps the table in a subset: never."""
-        return False
-
-
-# in this process, whatever else writes a PDF
-for _tag in _LAYOUT_TABLES:
-    registerCustomTableClass(_tag, __name__, UnusedTable.__name__)
 
 
 @contextmanager
@@ -196,6 +164,33 @@ def short_log(axis):
     plain_log(axis)
 
 
+def _pdf():
+    from rrru.figures.pdf_canvas import FigureCanvasPdf
+
+    return FigureCanvasPdf
+
+
+def _png():
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    return FigureCanvasAgg
+
+
+def _svg():
+    from matplotlib.backends.backend_svg import FigureCanvasSVG
+
+    return FigureCanvasSVG
+
+
+# files of a figure: what draws them, imported where such a file is written; the entry that would hold a date or a
+# version; the one for the caption
+KINDS = {
+    "pdf": (_pdf, "CreationDate", "Subject"),
+    "png": (_png, "Software", "Description"),
+    "svg": (_svg, "Date", "Description"),
+}
+
+
 def save(figure, paths, caption=""):
     """Write the files of a figure; they carry its caption but no date, and none is replaced before all are whole.
 
@@ -208,7 +203,7 @@ def save(figure, paths, caption=""):
             # straight to the canvas: savefig would draw everything a second time to arrange it
             figure.set_dpi(_DPI)
             canvas, undated, described = KINDS[kind]
-            write = getattr(canvas(figure), f"print_{kind}")
+            write = getattr(canvas()(figure), f"print_{kind}")
             write(path, metadata={undated: None, described: caption})
 
 

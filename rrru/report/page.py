@@ -11,6 +11,7 @@ from typing import Any
 import jinja2
 import pandas as pd
 
+from rrru.figures.files import fits_page
 from rrru.report import cards, cells, contents, svg
 from rrru.report.trust import trust
 from rrru.report.worth import Worth, worth
@@ -20,8 +21,6 @@ from rrru.store.schema import Table
 from rrru.studies import glossary
 
 TEMPLATES = Path(__file__).parent / "templates"
-# a figure that is larger than this as SVG is shown as its PNG
-_LARGEST_SVG = 400_000
 # heads of columns that hold numbers of legs or, for robots without legs, of drives
 _HEADS = {"legs": "leg or drive"}
 _TRUST = ("parameters", "correlations", "calibrations", "gap_parameters", "gap_verdicts")
@@ -123,7 +122,7 @@ class Results:
         text, key = place.read_text(), name.replace("/", "-")
         caption = svg.caption(text)
         drawn = svg.inline(text, key, title)
-        if len(drawn.markup) <= _LARGEST_SVG:
+        if fits_page(place):
             self.glyphs.update(drawn.glyphs)
             return Picture(key, title, caption, drawn.markup, drawn.width)
         data = base64.b64encode(place.with_suffix(".png").read_bytes()).decode()

@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 from markupsafe import escape
 
-from rrru.figures import style
+from rrru.figures import files, style
 from rrru.report import page
 from rrru.store import json_files, tables
 from tests.diagnosis.test_verdict_text import CAMPAIGN, answered
@@ -168,6 +168,6 @@ def test_a_folder_without_a_diagnosis_says_what_to_run(tmp_path):
 
 def test_a_figure_that_is_large_as_svg_is_shown_as_a_picture(folder, monkeypatch):
     assert "data:image/png" not in written(folder)
-    monkeypatch.setattr(page, "_LARGEST_SVG", 100)
+    monkeypatch.setattr(files, "LARGEST_SVG", 100)
     text = written(folder)
     assert f'<img alt="{CAMPAIGN}: The whole diagnosis" src="data:image/png;base64,' in text

@@ -1,6 +1,6 @@
 """Diagnosis of one campaign's gap between calibrated model and measurements, with its figures."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import pandas as pd
@@ -12,6 +12,7 @@ from rrru.diagnosis.schemas import TABLES, tables_of
 from rrru.diagnosis.settings import GapSettings
 from rrru.diagnosis.verdict_text import answer
 from rrru.figures.drawing import draw_all
+from rrru.figures.files import KINDS
 from rrru.kinematics.dynamics import Masses
 from rrru.kinematics.robot import Robot
 from rrru.pipeline import setup
@@ -76,12 +77,22 @@ def frames_of(settings: Mapping[str, Any], result: core.Diagnosis) -> dict[str, 
     }
 
 
-def write(settings: Mapping[str, Any], result: core.Diagnosis, nominal: Robot, paths: Mapping[str, str]) -> None:
-    """Write verdict, tables and figures of a Diagnosis to paths by name; nominal: the robot as measured."""
+def write(
+    settings: Mapping[str, Any],
+    result: core.Diagnosis,
+    nominal: Robot,
+    paths: Mapping[str, str],
+    kinds: Sequence[str] = KINDS,
+) -> None:
+    """Write verdict, tables and figures of a Diagnosis to paths by name.
+
+    nominal: the robot as measured; kinds: of the figures' files, see `draw_all`.
+    """
     json_files.write(facts(settings, result, nominal), paths["verdict"])
     frames = frames_of(settings, result)
     tables.write_all(tables_of(nominal), frames, paths)
-    draw_all(settings["figures"], {name: paths[name] for name in frames}, figure_options(settings, nominal), paths)
+    options = figure_options(settings, nominal)
+    draw_all(settings["figures"], {name: paths[name] for name in frames}, options, paths, kinds)
 
 
 def figure_options(settings: Mapping[str, Any], nominal: Robot) -> dict[str, Any]:

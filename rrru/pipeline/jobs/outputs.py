@@ -1,6 +1,5 @@
 """Names of the tables that the jobs of a campaign write, and of the figures drawn from them."""
 
-from collections.abc import Iterable
 from pathlib import Path
 
 READ_TABLES = ("measurements", "truth", "singularity", "campaigns", "registration", "workspace")
@@ -43,14 +42,8 @@ GAP_FIGURES = {
     "drive_functions": ("rrru.figures.drive_functions:drive_functions", ["gap_drive_functions"]),
     "gap_map": ("rrru.figures.gap:gap_map", ["gap_verdicts", "gap_points"]),
 }
-FIGURE_KINDS = ("pdf", "png", "svg")
 
 
 def part_path(folder: str | Path, campaign: str, name: str) -> str:
     """Path of one campaign's part of a table in a folder of results."""
     return f"{folder}/campaigns/{campaign}/{name}.parquet"
-
-
-def figure_paths(folder: str, figures: Iterable[str]) -> dict[str, str]:
-    """Paths of figures in a folder as PDF, PNG and SVG, by name and kind."""
-    return {f"{name}_{kind}": f"{folder}/{name}.{kind}" for name in figures for kind in FIGURE_KINDS}

@@ -6,6 +6,7 @@ from rrru.errors import ConfigError
 from rrru.plugins import module_files, own_code_digest
 from rrru.store.digest import code_digest
 from rrru.pipeline import config as parts
+from rrru.figures.files import figure_paths
 from rrru.pipeline.jobs.outputs import (
     CALIBRATION_TABLES,
     CAMPAIGN_FIGURES,
@@ -14,7 +15,6 @@ from rrru.pipeline.jobs.outputs import (
     GAP_TABLES,
     GENETIC_TABLES,
     READ_TABLES,
-    figure_paths,
     part_path,
 )
 

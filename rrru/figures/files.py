@@ -1,0 +1,31 @@
+"""The files of a figure; without Matplotlib, so that rules and pages know them without loading it."""
+
+from collections.abc import Iterable
+from pathlib import Path
+
+from rrru.errors import ConfigError
+
+KINDS = ("pdf", "png", "svg")
+# bytes of the largest SVG that a page holds; of a larger figure it shows the PNG
+LARGEST_SVG = 400_000
+
+
+def with_svg(kinds: Iterable[str]) -> list[str]:
+    """Kinds of files and SVG, which a page needs; ConfigError for one that is not of `KINDS`.
+
+    >>> with_svg(["png"])
+    ['png', 'svg']
+    """
+    if unknown := sorted(set(kinds) - set(KINDS)):
+        raise ConfigError(f"figures as {', '.join(unknown)}: no such files; allowed: {', '.join(KINDS)}")
+    return sorted({"svg", *kinds})
+
+
+def figure_paths(folder: str, figures: Iterable[str]) -> dict[str, str]:
+    """Paths of figures in a folder as PDF, PNG and SVG, by name and kind."""
+    return {f"{name}_{kind}": f"{folder}/{name}.{kind}" for name in figures for kind in KINDS}
+
+
+def fits_page(path: str | Path) -> bool:
+    """Whether a page holds the SVG file at path, and not the figure's PNG."""
+    return Path(path).stat().st_size <= LARGEST_SVG
