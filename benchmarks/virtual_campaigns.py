@@ -233,7 +233,9 @@ class VirtualCampaign:
     @cached_property
     def scale(self):
         """Units (p,) in which a step of each parameter moves the tool by about a millimetre."""
-        return np.where(np.array(self.mechanism.parameters.units) == "mm", 1.0, 1.0 / self.mechanism.angle_arm_mm)
+        return np.where(
+            np.array(self.mechanism.parameters.units) == "mm", 1.0, 1.0 / self.mechanism.characteristic_length_mm
+        )
 
     @cached_property
     def still(self):
@@ -286,7 +288,7 @@ def _with_parameters(robot, scene, commands):
         nominal = nominal.reading(reads)
     if scene.open:
         return nominal
-    readings = rows.readings(_read_as_commanded(commands), nominal.angle_arm_mm)
+    readings = rows.readings(_read_as_commanded(commands), nominal.characteristic_length_mm)
     return nominal.seen_at(rows.actuators(commands, nominal), rows.command(commands), readings)
 
 

@@ -125,7 +125,7 @@ class Calibration:
         """Root mean square of the orientations' residual angles, NaN where none was read."""
         if self.readings is None or not len(self.readings.turned):
             return np.nan
-        turns = self.residual_mm[len(self.readings) :] / self.readings.arm_mm
+        turns = self.residual_mm[len(self.readings) :] / self.readings.characteristic_length_mm
         return float(np.sqrt((turns**2).sum(axis=1).mean()))
 
 

@@ -36,18 +36,18 @@ def select(
     mechanism: Robot,
     patterns: Iterable[str],
     use_near_singularity: bool = True,
-    arm_mm: float = np.nan,
+    characteristic_length_mm: float = np.nan,
 ) -> TargetPositions | None:
     """The usable points on some trajectories, None where the campaign has too few of them to fit.
 
-    arm_mm: length that makes measured orientations comparable with positions.
+    characteristic_length_mm: length that makes measured orientations comparable with positions.
     """
     chosen = rows.on_trajectories(measurements, patterns) & rows.usable(measurements, use_near_singularity)
     if not chosen.any():
         return None
     frame = register_measurements(measurements.loc[chosen], mechanism)
     actuators, command = rows.actuators(frame, mechanism), rows.command(frame)
-    readings = rows.readings(frame, arm_mm)
+    readings = rows.readings(frame, characteristic_length_mm)
     mechanism = mechanism.seen_at(actuators, command, readings)
     if 3 * len(frame) < len(mechanism.parameters):
         return None
@@ -59,16 +59,17 @@ def fit_sets(
     mechanism: Robot,
     settings: CalibrationSettings,
     noise_mm: float | None = None,
-    arm_mm: float = np.nan,
+    characteristic_length_mm: float = np.nan,
 ) -> dict[tuple[str, str], Calibration]:
     """{(set, method): Calibration} of all sets of the CalibrationSettings that the campaign has points for.
 
-    By least squares, and by least mean distance where the genetic algorithm knows the robot. noise_mm, arm_mm: of the
-    campaign, see `rrru.calibration.campaign_noise.Noise`. Raises ConfigError where no set matches.
+    By least squares, and by least mean distance where the genetic algorithm knows the robot. noise_mm,
+    characteristic_length_mm: of the campaign, see `rrru.calibration.campaign_noise.Noise`. Raises ConfigError where no
+    set matches.
     """
     fits = {}
     for name, patterns in settings.sets.items():
-        residuals = select(measurements, mechanism, patterns, settings.use_near_singularity, arm_mm)
+        residuals = select(measurements, mechanism, patterns, settings.use_near_singularity, characteristic_length_mm)
         if residuals is not None:
             fit = calibrate(residuals, noise_mm, settings.loss, settings.loss_scale_mm)
             fits[name, "least_squares"] = fit

@@ -26,7 +26,7 @@ class Noise(NamedTuple):
     rad_source: str = ""
 
     @property
-    def arm_mm(self) -> float:
+    def characteristic_length_mm(self) -> float:
         """Length that makes orientations comparable with positions."""
         return self.mm / self.rad if self.mm > 0.0 and self.rad > 0.0 else np.nan
 
@@ -49,7 +49,7 @@ def campaign_noise(
     turned = rows.has_turns(measurements)
     if noise_mm is not None and (noise_rad or not turned):
         return Noise(noise_mm, noise_rad, known, "given") if noise_rad and turned else Noise(noise_mm, np.nan, known)
-    residuals = select(measurements, robot, ["*"], use_near_singularity, robot.angle_arm_mm)
+    residuals = select(measurements, robot, ["*"], use_near_singularity, robot.characteristic_length_mm)
     if residuals is None:
         raise ConfigError("too few usable points to estimate noise_mm; give it")
     fit, used = calibrate(residuals), measurements[rows.usable(measurements, use_near_singularity)]
@@ -57,7 +57,9 @@ def campaign_noise(
     series, positions = reading_series(used, residuals.readings), np.arange(len(left)) < len(used)
     found_rad, rad_source = np.nan, ""
     if turned:
-        found_rad = noise_rad or high_frequency_noise(left, columns, series, ~positions) / robot.angle_arm_mm
+        found_rad = (
+            noise_rad or high_frequency_noise(left, columns, series, ~positions) / robot.characteristic_length_mm
+        )
         rad_source = "given" if noise_rad else "high_frequency"
     if noise_mm is not None:
         return Noise(noise_mm, found_rad, known, rad_source)

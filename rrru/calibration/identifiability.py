@@ -19,7 +19,9 @@ RANK_TOLERANCE = 1e-6
 
 def parameter_scale(mechanism: Robot) -> np.ndarray:
     """Deviation (p,) that moves something by about 1 mm: 1 mm for lengths, 1 mm over the mechanism's arm for angles."""
-    return np.array([1.0 / mechanism.angle_arm_mm if unit == "rad" else 1.0 for unit in mechanism.parameters.units])
+    return np.array(
+        [1.0 / mechanism.characteristic_length_mm if unit == "rad" else 1.0 for unit in mechanism.parameters.units]
+    )
 
 
 @dataclass(frozen=True)

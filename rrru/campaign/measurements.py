@@ -61,10 +61,10 @@ def has_turns(measurements: pd.DataFrame) -> bool:
     return "measured_rx_rad" in measurements and bool(measurements["measured_rx_rad"].notna().any())
 
 
-def readings(measurements: pd.DataFrame, arm_mm: float = np.nan) -> Readings | None:
+def readings(measurements: pd.DataFrame, characteristic_length_mm: float = np.nan) -> Readings | None:
     """The Readings at the n rows of a table, None where only positions of the tool were read.
 
-    arm_mm: see Readings.
+    characteristic_length_mm: see Readings.
     """
     reflectors = place = on_world = None
     if "target" in measurements:
@@ -73,7 +73,7 @@ def readings(measurements: pd.DataFrame, arm_mm: float = np.nan) -> Readings | N
     elif not has_turns(measurements):
         return None
     turn = turns(measurements, "measured") if has_turns(measurements) else None
-    return Readings(measured(measurements), reflectors, place, turn, arm_mm, on_world)
+    return Readings(measured(measurements), reflectors, place, turn, characteristic_length_mm, on_world)
 
 
 def on_the_world(measurements: pd.DataFrame) -> np.ndarray | None:

@@ -57,8 +57,8 @@ class TargetReadings:
     body_mm (n, 3), body_turn (n, 3, 3): poses of what carries each target, zero and the identity for a target that is
     fixed to the world; measured_mm (n, 3): in the instrument's frame; target (n,): number of each; place_mm (k, 3):
     known places of the targets on their bodies, NaN where unknown; centre_mm (3,): about which unknown ones are
-    expected; turn (n, 3, 3): measured orientations, NaN where none was, None where none was at all; arm_mm: length
-    that makes these comparable with positions.
+    expected; turn (n, 3, 3): measured orientations, NaN where none was, None where none was at all;
+    characteristic_length_mm: length that makes these comparable with positions.
     """
 
     body_mm: FloatArray
@@ -68,7 +68,7 @@ class TargetReadings:
     place_mm: FloatArray
     centre_mm: npt.ArrayLike = (0.0, 0.0, 0.0)
     turn: FloatArray | None = None
-    arm_mm: float = np.nan
+    characteristic_length_mm: float = np.nan
 
     @property
     def unknown(self) -> IntArray:
@@ -208,7 +208,7 @@ def _with_turns(matrix: FloatArray, readings: TargetReadings, turn: FloatArray, 
         # column by column of T X - Q M = 0
         turns[:, :, column, linear + column : linear + 9 : 3] = readings.body_turn[rows]
         turns[:, :, column, linear + 9 : linear + 18] = -_entries(turn[rows][:, :, column])
-    scale = readings.arm_mm * np.sqrt(weights[rows])
+    scale = readings.characteristic_length_mm * np.sqrt(weights[rows])
     return np.concatenate([spread, (turns * scale[:, None, None, None]).reshape(-1, spread.shape[1])])
 
 

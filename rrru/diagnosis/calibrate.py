@@ -22,4 +22,4 @@ def observations_of(problem: DiagnosisProblem) -> TargetPositions:
     """TargetPositions of the problem's used points."""
     frame = problem.measurements[problem.used]
     driven = rows.actuators(frame, problem.mechanism), rows.measured(frame), rows.command(frame)
-    return TargetPositions(problem.mechanism, *driven, rows.readings(frame, problem.arm_mm))
+    return TargetPositions(problem.mechanism, *driven, rows.readings(frame, problem.characteristic_length_mm))

@@ -21,7 +21,7 @@ from rrru.diagnosis.inference import (
     UNKNOWN_NOISE,
     InferenceResult,
     infer,
-    with_arm,
+    with_characteristic_length,
     with_effects,
     with_world_scale,
 )
@@ -121,12 +121,14 @@ def diagnose(
     library = settings.library(robot.mechanism)
     stated = (KNOWN if robot.noise_known else STATED) if robot.noise_mm else UNKNOWN_NOISE
     nominal, near = with_wide_bounds(robot.mechanism), settings.use_near_singularity
-    arm_mm = nominal.angle_arm_mm if rows.has_turns(measurements) else np.nan
-    problem = make_diagnosis_problem(measurements, nominal, robot.masses, robot.noise_mm or 1.0, library, near, arm_mm)
+    characteristic_length_mm = nominal.characteristic_length_mm if rows.has_turns(measurements) else np.nan
+    problem = make_diagnosis_problem(
+        measurements, nominal, robot.masses, robot.noise_mm or 1.0, library, near, characteristic_length_mm
+    )
     problem = replace(problem, nuisance_sd=settings.nuisance_sd(problem.nuisance_sd))
     problem = require_determined(problem, f"campaign {robot.campaign}: " if robot.campaign else "")
     if rows.has_turns(measurements):
-        problem = with_arm(problem, robot.noise_mm, robot.noise_rad)
+        problem = with_characteristic_length(problem, robot.noise_mm, robot.noise_rad)
     problem = with_world_scale(problem)
     generator = stream(settings.seed, "gap", robot.campaign)
     begin(STEPS[1])

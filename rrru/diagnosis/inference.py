@@ -97,7 +97,7 @@ class InferenceResult:
         return replace(self, posterior=posterior, hypothesis=hypothesis, level=level)
 
 
-def with_arm(
+def with_characteristic_length(
     problem: DiagnosisProblem, noise_mm: float | None = None, noise_rad: float | None = None
 ) -> DiagnosisProblem:
     """The problem with orientations at the arm that gives them the positions' noise; what is not given is estimated.
@@ -111,8 +111,8 @@ def with_arm(
         found, turned = (high_frequency_noise(linear.data, columns, problem.series, chosen) for chosen in both)
         if noise_rad:
             found = noise_mm or noise.quieter_repeats(problem.measurements[problem.used], found) or found
-        noise_mm, noise_rad = found, noise_rad or turned / problem.arm_mm
-    return replace(problem, arm_mm=noise_mm / noise_rad)
+        noise_mm, noise_rad = found, noise_rad or turned / problem.characteristic_length_mm
+    return replace(problem, characteristic_length_mm=noise_mm / noise_rad)
 
 
 def with_world_scale(problem: DiagnosisProblem) -> DiagnosisProblem:

@@ -49,7 +49,7 @@ def make_diagnosis_problem(
     noise_mm: float,
     library: Mapping[str, Effect],
     use_near_singularity: bool = True,
-    arm_mm: float = np.nan,
+    characteristic_length_mm: float = np.nan,
 ) -> DiagnosisProblem:
     """The DiagnosisProblem of a measurement table.
 
@@ -83,7 +83,7 @@ def make_diagnosis_problem(
         testable,
         untestable,
         float(noise_mm),
-        float(arm_mm),
+        float(characteristic_length_mm),
         motion_at=motion_at,
         nuisance_sd=nuisance_sd,
         bounds=bounds,

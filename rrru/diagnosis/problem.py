@@ -44,9 +44,9 @@ class DiagnosisProblem:
     What was read at them makes m rows of three numbers in mm: positions, and after them orientations at their arm.
     library: effects by name that the campaign can test, and after them the functions of
     `rrru.diagnosis.discrepancy_basis` that it can; untestable: name to the reason for the other effects; noise_mm:
-    deviation per axis; arm_mm: of `rrru.kinematics.readings.Readings`; noise: its NoiseModel, white where there is
-    none; beside_scale: weight of the rows of reflectors that are not on the robot, so that they have the noise of the
-    others; motion_at: from where the robot stands to the motion with the loads there, see
+    deviation per axis; characteristic_length_mm: of `rrru.kinematics.readings.Readings`; noise: its NoiseModel, white
+    where there is none; beside_scale: weight of the rows of reflectors that are not on the robot, so that they have the
+    noise of the others; motion_at: from where the robot stands to the motion with the loads there, see
     `rrru.effects.motion.make_motion`; nuisance_sd, bounds: of the errors of payload and tilt, see
     `rrru.diagnosis.payload_nuisance`; known: effect to the points (N,) at which the campaign has all that the effect
     needs, of the effects that lack something at a used point; massless: whether no mass of the robot itself is stated.
@@ -59,7 +59,7 @@ class DiagnosisProblem:
     library: Library
     untestable: dict[str, str]
     noise_mm: float
-    arm_mm: float = np.nan
+    characteristic_length_mm: float = np.nan
     noise: NoiseModel | None = None
     beside_scale: float = 1.0
     motion_at: Callable[..., Motion] | None = None
@@ -89,7 +89,7 @@ class DiagnosisProblem:
     @cached_property
     def readings(self) -> Readings | None:
         """What was read at all points, None where that are positions of the tool."""
-        return rows.readings(self.measurements, self.arm_mm)
+        return rows.readings(self.measurements, self.characteristic_length_mm)
 
     @cached_property
     def _used_rows(self) -> IntArray:

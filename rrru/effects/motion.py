@@ -94,7 +94,7 @@ def standing(
     shift, turn = poses.point(tool) - at.poses.point(tool), poses.turned_from(at.poses.turn)
     lack, slopes = shift, at.point @ at.drive_counts
     if turned:
-        arm = robot.angle_arm_mm
+        arm = robot.characteristic_length_mm
         lack = np.concatenate([shift, arm * turn], axis=1)
         slopes = np.concatenate([slopes, arm * at.turn @ at.drive_counts], axis=1)
     known, step = np.isfinite(lack).all(axis=1), np.zeros(actuators.shape)

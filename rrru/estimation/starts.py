@@ -59,7 +59,11 @@ def register_poses(
     if known.sum() < _MIN_READINGS:
         raise FitError(f"{known.sum()} readings at poses that the robot can take; allowed: at least {_MIN_READINGS}")
     orientations = None if readings.turn is None else readings.turn[known]
-    arm_mm = readings.arm_mm if np.isfinite(readings.arm_mm) else robot.angle_arm_mm
+    characteristic_length_mm = (
+        readings.characteristic_length_mm
+        if np.isfinite(readings.characteristic_length_mm)
+        else robot.characteristic_length_mm
+    )
     found = TargetReadings(
         centre[known],
         turn[known],
@@ -68,7 +72,7 @@ def register_poses(
         place,
         np.asarray(robot.tool_mm),
         orientations,
-        arm_mm,
+        characteristic_length_mm,
     )
     return register_targets(found, mirrored)
 
@@ -122,7 +126,7 @@ def register_measurements(measurements: pd.DataFrame, robot: Robot) -> pd.DataFr
         return measurements
     actuators, command = rows.actuators(measurements, robot), rows.command(measurements)
     poses, twists = robot.solve(actuators, command), robot.twists()
-    readings = rows.readings(measurements, robot.angle_arm_mm) or Readings(rows.measured(measurements))
+    readings = rows.readings(measurements, robot.characteristic_length_mm) or Readings(rows.measured(measurements))
     off = np.linalg.norm(lacking(robot, replace(readings, turn=None), poses, twists)[used], axis=1)
     off = off[np.isfinite(off)]
     if not len(off) or np.median(off) <= LOST_SHARE_OF_SIZE * robot.size_mm:

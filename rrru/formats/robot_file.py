@@ -228,7 +228,9 @@ def _robot(
     chains, legs, moves = structure.chains, structure.legs, structure.driven
     ends = [np.linalg.norm(leg.bar.platform_mm) for leg in legs.legs if leg.bar]
     arm = float(np.mean(ends)) if ends else 0.0
-    defaults: dict[str, Any] = {"name": assembly.file.stem, "up": structure.up} | ({"angle_arm_mm": arm} if arm else {})
+    defaults: dict[str, Any] = {"name": assembly.file.stem, "up": structure.up} | (
+        {"characteristic_length_mm": arm} if arm else {}
+    )
     drives, followers = _drives(legs, [_drive(legs, k, move, chains.sites[move.name]) for k, move in enumerate(moves)])
     parts = Parts(
         drives=drives, followers=followers, members=tuple((leg.bar_sites[0],) for leg in legs.legs if leg.bar)

@@ -15,7 +15,7 @@ from rrru.formats.joint_graph import Move, undone
 from rrru.formats.mjcf_reader import Assembly
 from rrru.kinematics.chain import PoseGuess, Twists, bar_pose, walk
 from rrru.kinematics.closure import Closure
-from rrru.kinematics.closure_kernel import ARM_MM
+from rrru.kinematics.closure_kernel import CHARACTERISTIC_LENGTH_MM
 from rrru.kinematics.legs import Legs
 from rrru.kinematics.mobility import free_motions
 
@@ -116,5 +116,5 @@ def _gaps(legs: Legs, poses: PoseGuess) -> np.ndarray:
             result.append(abs(bar_pose(legs, leg, way, poses, actuators, twists).lack_mm[0]))
         else:
             off = Rotation.from_matrix(way.turn[0] @ poses.turn[0].T).magnitude()
-            result.append(np.linalg.norm(way.place - poses.position_mm) + ARM_MM * off)
+            result.append(np.linalg.norm(way.place - poses.position_mm) + CHARACTERISTIC_LENGTH_MM * off)
     return np.array(result)

@@ -76,7 +76,7 @@ class AugmentedRobot(Robot):
         columns, count = at.columns(complete.directions), len(self.robot.parameters)
         columns = columns.reshape(-1, columns.shape[2])
         basis, _ = np.linalg.qr(columns[:, :count])
-        scale = column_scale(self._added, self.angle_arm_mm)
+        scale = column_scale(self._added, self.characteristic_length_mm)
         chosen, _ = choose(columns[:, count:] * scale, [True] * len(scale), _LEFT_OF_DATA, basis)
         return replace(self, added=tuple(self._added[k] for k in chosen))
 
@@ -120,7 +120,7 @@ def _own(name: str) -> property:
 
 # tests/kinematics/test_readings.py goes over the attributes of all robots: one that is missing here is found there
 for _name in (
-    *("name", "parts", "angle_arm_mm", "up", "up_stated", "tool_mm", "orients", "workspace_lines", "seats"),
+    *("name", "parts", "characteristic_length_mm", "up", "up_stated", "tool_mm", "orients", "workspace_lines", "seats"),
     "point_masses",
     *("reach_mm", "size_mm", "farthest_mm", "freedoms", "strokes", "drive_range", "effort_limits", "velocity_limits"),
     *("TRACKED", "RICHEST", "SEARCHED", "in_range", "unreached", "guess", "passive_near", "gauge"),

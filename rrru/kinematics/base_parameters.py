@@ -117,9 +117,9 @@ def offered(legs: Legs, candidates: Sequence[Candidate]) -> BoolArray:
     return np.asarray(np.any([direction(legs, one).astype(bool) for one in candidates], axis=0))
 
 
-def column_scale(candidates: Sequence[Candidate], arm_mm: float) -> FloatArray:
+def column_scale(candidates: Sequence[Candidate], characteristic_length_mm: float) -> FloatArray:
     """Factors (c,) that make columns of Candidates comparable: those of angles count at an arm in mm."""
-    return np.array([1.0 if one.unit == "mm" else 1.0 / arm_mm for one in candidates])
+    return np.array([1.0 if one.unit == "mm" else 1.0 / characteristic_length_mm for one in candidates])
 
 
 def choose(

@@ -20,7 +20,7 @@ from rrru.arrays import BoolArray, FloatArray
 from rrru.errors import ConfigError
 from rrru.kinematics import closure_kernel
 from rrru.kinematics.chain import PoseGuess, Poses, Twists, Walk
-from rrru.kinematics.closure_kernel import ARM_MM, Tables
+from rrru.kinematics.closure_kernel import CHARACTERISTIC_LENGTH_MM, Tables
 from rrru.kinematics.legs import Leg, Legs
 from rrru.kinematics.wrenches import SCALE, by_group, constraints_of, spare_joints, wrenches_of
 
@@ -64,7 +64,7 @@ class Closure:
             raise ConfigError(f"the legs hold the platform by {sum(counts)} constraints; allowed: at least 6")
         self._tables = tables(legs, self._spare)
         # with more than six constraints lengths, of bars and of chains' shifts, count in units of the arm
-        weights = [1.0 / ARM_MM if legs.legs[group[0]].bar else 1.0 for group in groups]
+        weights = [1.0 / CHARACTERISTIC_LENGTH_MM if legs.legs[group[0]].bar else 1.0 for group in groups]
         self._weights = np.repeat(weights, counts)[:, None]
         ends = np.cumsum([0, *counts])
         slices = {k: slice(*ends[row : row + 2]) for row, group in enumerate(groups) for k in group}
@@ -181,7 +181,7 @@ def closed(
     left, lacks = np.empty(n), np.zeros((n, legs, 6))
     closure_kernel.solve(tables, room, drives, twists.values, twists.active, platform, passive, left, lacks)
     if all_met:
-        arms = np.where(ends[:, 3], 1.0, closure_kernel.ARM_MM)
+        arms = np.where(ends[:, 3], 1.0, closure_kernel.CHARACTERISTIC_LENGTH_MM)
         left = np.maximum(left, (np.linalg.norm(lacks, axis=2) * arms).max(axis=1))
     left[~known] = np.inf
     good = left < _CLOSED_MM

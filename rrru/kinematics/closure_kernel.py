@@ -17,7 +17,7 @@ from rrru.kinematics.typed_numba import njit
 TOLERANCE_MM, MOST_STEPS = 1e-10, 60
 # a step turns by less and moves by less than this
 LONGEST_RAD, LONGEST_MM = 0.3, 150.0
-ARM_MM = 500.0
+CHARACTERISTIC_LENGTH_MM = 500.0
 # share of a squared screw that must be independent of the directions before it
 _INDEPENDENT_SHARE = 1e-13
 
@@ -144,7 +144,10 @@ def _chain(
         v, w = _displace(frame, screws[j], values[numbers[j]])
         moment = _cross(_triple(frame[3]), w)
         for c in range(3):
-            basis[j, c], basis[j, 3 + c] = screws[j, 6] * (moment[c] + v[c]) / ARM_MM, screws[j, 6] * w[c]
+            basis[j, c], basis[j, 3 + c] = (
+                screws[j, 6] * (moment[c] + v[c]) / CHARACTERISTIC_LENGTH_MM,
+                screws[j, 6] * w[c],
+            )
     _append(frame, links[len(numbers)])
     x = y = z = 0.0
     for i in range(3):
@@ -152,7 +155,7 @@ def _chain(
         x, y, z = x + 0.5 * turn[0], y + 0.5 * turn[1], z + 0.5 * turn[2]
     along = _cross((x, y, z), _triple(platform[3]))
     for c in range(3):
-        lack[c] = (frame[3, c] - platform[3, c] - along[c]) / ARM_MM
+        lack[c] = (frame[3, c] - platform[3, c] - along[c]) / CHARACTERISTIC_LENGTH_MM
     lack[3], lack[4], lack[5] = x, y, z
 
 
@@ -186,11 +189,18 @@ def _count_bar(
     length = np.sqrt(x * x + y * y + z * z)
     x, y, z = x / length, y / length, z / length
     moment, lack = _cross(b, (x, y, z)), bar[0] + change - length
-    wrench = (x, y, z, moment[0] / ARM_MM, moment[1] / ARM_MM, moment[2] / ARM_MM)
+    wrench = (
+        x,
+        y,
+        z,
+        moment[0] / CHARACTERISTIC_LENGTH_MM,
+        moment[1] / CHARACTERISTIC_LENGTH_MM,
+        moment[2] / CHARACTERISTIC_LENGTH_MM,
+    )
     for i in range(6):
         for c in range(i, 6):
             equations[k + i, k + c] += wrench[i] * wrench[c]
-        equations[k + i, k + 6] += wrench[i] * lack / ARM_MM
+        equations[k + i, k + 6] += wrench[i] * lack / CHARACTERISTIC_LENGTH_MM
     return lack
 
 
@@ -227,7 +237,7 @@ def _advance(platform: FloatArray, values: FloatArray, turning: BoolArray, step:
     turned = max(turned, np.sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2]))
     along = _cross(w, _triple(platform[3]))
     for c in range(3):
-        step[k + c] = ARM_MM * step[k + c] + along[c]
+        step[k + c] = CHARACTERISTIC_LENGTH_MM * step[k + c] + along[c]
         moved += step[k + c] * step[k + c]
     moved = np.sqrt(moved)
     share = min(1.0, LONGEST_MM / moved, LONGEST_RAD / turned)
@@ -237,7 +247,7 @@ def _advance(platform: FloatArray, values: FloatArray, turning: BoolArray, step:
     for j in range(k):
         values[j] += share * step[j]
     # not a number where the platform's motion is none
-    return moved + max(0.0, ARM_MM * turned - moved, slid - moved)
+    return moved + max(0.0, CHARACTERISTIC_LENGTH_MM * turned - moved, slid - moved)
 
 
 @_inside

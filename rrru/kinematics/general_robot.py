@@ -59,7 +59,7 @@ class GeneralRobot(Robot):
     legs: Legs
     parts: Parts
     drive_range: FloatArray
-    angle_arm_mm: float = 500.0
+    characteristic_length_mm: float = 500.0
     parameter_set: str = "zero"
     angle_limit_rad: float = 0.1
     length_limit_mm: float = 30.0
@@ -97,7 +97,7 @@ class GeneralRobot(Robot):
         at = self.map_of_closed(actuators, position, readings)
         candidates = self.candidates
         columns = at.columns(np.stack([direction(self.legs, candidate) for candidate in candidates], axis=-1))
-        sizes = column_scale(candidates, self.angle_arm_mm)
+        sizes = column_scale(candidates, self.characteristic_length_mm)
         names = {candidate.name for candidate in wanted}
         names &= set(self.among or names)
         allowed = [candidate.name in names for candidate in candidates]
@@ -308,7 +308,7 @@ class GeneralRobot(Robot):
         actuators, position = (part[:10] for part in self._workspace())
         at = self.map_of_closed(actuators, position)
         position_rank = np.linalg.matrix_rank(at.drive_response, rtol=_SEEN).max()
-        turn = self.angle_arm_mm * at.platform[:, 3:] @ at.drive_counts
+        turn = self.characteristic_length_mm * at.platform[:, 3:] @ at.drive_counts
         pose_rank = np.linalg.matrix_rank(np.concatenate([at.drive_response, turn], axis=1), rtol=_SEEN).max()
         return int(position_rank), int(pose_rank - position_rank)
 

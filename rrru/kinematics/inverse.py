@@ -68,7 +68,7 @@ def inverse_kinematics(
         if nearest:
             # a plane that deviations have tilted does not contain the commanded points: the nearest ones replace them
             lack = np.where(lost[:, None], lack, gain)
-        left[rows] = np.linalg.norm(lack, axis=1) + robot.angle_arm_mm * held
+        left[rows] = np.linalg.norm(lack, axis=1) + robot.characteristic_length_mm * held
         step *= np.minimum(1.0, _LONGEST_STEP / np.maximum(longest, 1e-9))[:, None]
         # a stretched arm gets no step in the direction of its singularity: it is moved away from there
         still = lost & (longest < _STILL) & (left[rows] >= _REACHED_MM)
@@ -114,7 +114,7 @@ def _widths(robot: "Robot") -> FloatArray:
     width = np.minimum(
         np.ptp(np.asarray(robot.drive_range, dtype=float), axis=1), np.where(turning, 2.0 * np.pi, np.inf)
     )
-    turn = np.where(turning, 2.0 * np.pi, 2.0 * np.pi * robot.angle_arm_mm)
+    turn = np.where(turning, 2.0 * np.pi, 2.0 * np.pi * robot.characteristic_length_mm)
     return np.where((width > 0.0) & np.isfinite(width), width, turn)
 
 

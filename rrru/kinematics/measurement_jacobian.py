@@ -116,7 +116,7 @@ class ReadingMap(TwistMap):
         readings = self._readings
         if not len(readings.turned):
             return shifts
-        return np.concatenate([shifts, readings.arm_mm * self._slope @ turns()[readings.turned]])
+        return np.concatenate([shifts, readings.characteristic_length_mm * self._slope @ turns()[readings.turned]])
 
     @cached_property
     def _slope(self) -> FloatArray:

@@ -6,20 +6,20 @@ import numpy as np
 
 from rrru.arrays import FloatArray
 from rrru.kinematics.chain import PoseGuess, Twists, walks
-from rrru.kinematics.closure_kernel import ARM_MM
+from rrru.kinematics.closure_kernel import CHARACTERISTIC_LENGTH_MM
 from rrru.kinematics.legs import Legs
 from rrru.kinematics.wrenches import by_group, spare_joints, wrenches_of
 
 # singular values below this share of the largest are none
 _NONE = 1e-6
-_SCALE = np.repeat([ARM_MM, 1.0], 3)
+_SCALE = np.repeat([CHARACTERISTIC_LENGTH_MM, 1.0], 3)
 
 
 def free_motions(legs: Legs, up: Sequence[float] | FloatArray = (0.0, 0.0, 1.0)) -> list[str]:
     """The motions in words, at the home pose of Legs, such as "turn about the vertical axis through the platform"."""
     free = _free_twists(legs)
     # at the platform's centre: shifts, turns about it, then the remaining screws
-    free[:, :3] += np.cross(free[:, 3:], legs.home_mm / ARM_MM)
+    free[:, :3] += np.cross(free[:, 3:], legs.home_mm / CHARACTERISTIC_LENGTH_MM)
     shifts, turns = _without(free, slice(3, 6)), _without(free, slice(0, 3))
     pure = np.concatenate([shifts, turns])
     left = np.linalg.svd(free - free @ np.linalg.pinv(pure) @ pure)[2][: len(free) - len(pure)]
@@ -66,9 +66,11 @@ def _direction(vector: FloatArray, up: Sequence[float] | FloatArray) -> str:
 
 def _screw(twist: FloatArray, centre_mm: FloatArray, up: Sequence[float] | FloatArray) -> str:
     """A twist (6,) at the platform's centre, lengths counted in the arm, in words."""
-    shift, turn = twist[:3] * ARM_MM, twist[3:]
+    shift, turn = twist[:3] * CHARACTERISTIC_LENGTH_MM, twist[3:]
     square = turn @ turn
     x, y, z = centre_mm + np.cross(turn, shift) / square
     pitch = shift @ turn / square
-    screw = f" while shifting along it by {pitch:.3g} mm per rad" if abs(pitch) > ARM_MM * _NONE else ""
+    screw = (
+        f" while shifting along it by {pitch:.3g} mm per rad" if abs(pitch) > CHARACTERISTIC_LENGTH_MM * _NONE else ""
+    )
     return f"turn about {_direction(turn, up)} through ({x:.3f}, {y:.3f}, {z:.3f}) mm{screw}"

@@ -227,13 +227,15 @@ class TwistMap:
         size = singular_values(self.drive_response / lengths_mm)
         return size[:, -1] / size[:, 0]
 
-    def constraint_measures(self, arm_mm: float) -> tuple[FloatArray, FloatArray]:
+    def constraint_measures(self, characteristic_length_mm: float) -> tuple[FloatArray, FloatArray]:
         """Smallest singular value and determinant (n,) of the legs' wrenches about the point, orthonormal by group.
 
         Moments count at an arm in mm. The determinant has a sign where every leg is a bar; it is positive elsewhere.
         """
         groups = by_group(self.closure.legs, self._wrenches)
-        legs = [_orthonormal(_about(one, self.point_mm) / ([1.0] * 3 + [arm_mm] * 3)) for one in groups]
+        legs = [
+            _orthonormal(_about(one, self.point_mm) / ([1.0] * 3 + [characteristic_length_mm] * 3)) for one in groups
+        ]
         rows = np.concatenate(legs, axis=1)
         if rows.shape[1] == 6 and all(leg.bar for leg in self.closure.legs.legs):
             return singular_values(rows)[:, -1], np.linalg.det(rows)

@@ -1,7 +1,7 @@
 """Readings of an instrument: places of reflectors on a robot's tool, and the orientation of its platform.
 
-A residual has three numbers in each of m rows. The first n rows are those of positions, in mm. After them come those of
-the k orientations read: rotation vectors in rad times a characteristic length in mm. All rows have the same noise.
+A residual has m = n + k rows of three numbers. The first n rows are of the positions, in mm. After them come the rows
+of the k orientations read: rotation vectors in rad times a characteristic length in mm. All rows have the same noise.
 """
 
 from dataclasses import dataclass, fields
@@ -26,10 +26,15 @@ _EYE = np.eye(3)
 class Readings:
     """Readings at n poses.
 
-    position_mm (n, 3); reflectors (n,): names of the sites of the reflectors read, and place_mm (n, 3): where on the
-    platform they nominally sit, None where the tool itself was read; turn (n, 3, 3): orientations of the platform, NaN
-    where not read, None where none was; arm_mm: noise of the positions over that of the orientations, mm per rad;
-    on_world (n,): which reflectors are fixed to the world instead, with places in the robot's frame, None if none is.
+    position_mm (n, 3): measured positions, world frame.
+    reflectors (n,): names of the sites of the reflectors read, None where the tool itself was read.
+    place_mm (n, 3): nominal positions of these reflectors in the platform's frame, None where `reflectors` is.
+    turn (n, 3, 3): measured orientations of the platform, NaN where not read, None where none was.
+    characteristic_length_mm: noise of the positions over that of the orientations, mm per rad; it turns the residuals
+        of orientations into mm of the same noise.
+    on_world (n,): which reflectors are fixed to the world instead, with `place_mm` in the robot's frame; None if none
+        is.
+
     Raises ValueError for reflectors without places, or places without reflectors.
     """
 
@@ -37,7 +42,7 @@ class Readings:
     reflectors: npt.NDArray[np.str_] | None = None
     place_mm: FloatArray | None = None
     turn: FloatArray | None = None
-    arm_mm: float = np.nan
+    characteristic_length_mm: float = np.nan
     on_world: BoolArray | None = None
 
     def __post_init__(self) -> None:
@@ -116,7 +121,7 @@ def lacking(robot: "Robot", readings: Readings, poses: Poses, twists: FloatArray
     position = readings.position_mm - robot.measured(poses, twists, readings)
     if not len(readings.turned):
         return position
-    return np.concatenate([position, readings.arm_mm * turn_lacking(robot, readings, poses, twists)])
+    return np.concatenate([position, readings.characteristic_length_mm * turn_lacking(robot, readings, poses, twists)])
 
 
 def turn_lacking(robot: "Robot", readings: Readings, poses: Poses, twists: FloatArray) -> FloatArray:

@@ -29,13 +29,17 @@ from rrru.parameters import ParameterSet
 class Robot(ABC):
     """The nominal robot of the controller, with small deviations of its parameters.
 
-    name; parameters: a ParameterSet, the meaning of every vector of deviations (p,); legs: `rrru.kinematics.legs.Legs`;
-    parts: its Parts; directions (sites, 6, p): the twists that a unit of each parameter makes; TRACKED: the set of
-    parameters that measured positions identify, RICHEST: the largest such set, SEARCHED: that of the genetic algorithm;
-    angle_arm_mm: characteristic length that makes angles comparable with lengths; size_mm: upper bound of the tool's
-    distance from the origin; farthest_mm: that of the farthest reachable point, or size_mm; reach_mm: upper bound of
-    the tool's distance from a leg's foot; drive_range (K, 2): actuator values between which it works, None where none
-    is stated; up (3,): away from the ground, up_stated: whether its description says so, or it is assumed.
+    name: in configurations and tables.
+    parameters: a ParameterSet, the meaning of every vector of deviations (p,).
+    legs: `rrru.kinematics.legs.Legs`; parts: its Parts.
+    directions (sites, 6, p): the twists that a unit of each parameter makes.
+    TRACKED, RICHEST, SEARCHED: names of parameter sets: one that measured positions identify, the largest such one, the
+        one that the genetic algorithm searches ("" for none).
+    characteristic_length_mm: length that makes angles comparable with lengths.
+    size_mm: upper bound of the tool's distance from the origin; farthest_mm: distance of the farthest reachable point
+        from there, or size_mm; reach_mm: upper bound of the tool's distance from a leg's foot.
+    drive_range (K, 2): lowest and highest actuator values between which it works, None where none is stated.
+    up (3,): unit vector away from the ground; up_stated: whether its description states it, else it is assumed.
 
     Every attribute that code asks a robot for is named in this class, with its default where most robots have it.
     """
@@ -76,7 +80,7 @@ class Robot(ABC):
             """Twists (sites, 6, p) that a unit of each parameter makes."""
 
         @property
-        def angle_arm_mm(self) -> float:
+        def characteristic_length_mm(self) -> float:
             """Characteristic length that makes angles comparable with lengths."""
 
         @property
@@ -99,7 +103,7 @@ class Robot(ABC):
         parameters: ParameterSet
         legs: Legs
         directions: FloatArray
-        angle_arm_mm: float
+        characteristic_length_mm: float
         size_mm: float
         farthest_mm: float
         reach_mm: float
@@ -307,12 +311,13 @@ class Robot(ABC):
         """Distance of poses from singularities: translational measure, constraint measure and determinant, each (n,).
 
         The constraint measure is the smallest singular value of the legs' unit wrenches, lengths counted in the robot's
-        angle_arm_mm, 0 where the platform can move with locked drives; the translational one that of the position
-        Jacobian over its largest, angles times angle_arm_mm, 0 where they cannot move the point in some direction.
+        characteristic_length_mm, 0 where the platform can move with locked drives; the translational one that of the
+        position Jacobian over its largest, angles times characteristic_length_mm, 0 where they cannot move the point in
+        some direction.
         """
         at = self.map_at(actuators, position_mm)
-        lengths = np.array([1.0 if unit == "mm" else self.angle_arm_mm for unit in self.parts.units])
-        return at.translational_measure(lengths), *at.constraint_measures(self.angle_arm_mm)
+        lengths = np.array([1.0 if unit == "mm" else self.characteristic_length_mm for unit in self.parts.units])
+        return at.translational_measure(lengths), *at.constraint_measures(self.characteristic_length_mm)
 
     def own_load(
         self, masses: Masses, motion: DriveMotion, poses: Poses, gravity_mm_s2: FloatArray

@@ -11,12 +11,12 @@ import numpy as np
 
 from rrru.arrays import FloatArray
 from rrru.kinematics.chain import Twists, Walk, walk
-from rrru.kinematics.closure_kernel import ARM_MM
+from rrru.kinematics.closure_kernel import CHARACTERISTIC_LENGTH_MM
 from rrru.kinematics.legs import Joint, Legs, cross
 
 # smallest singular value of a leg's passive screws, lengths counted in the arm, that counts as a motion
 _RANK = 1e-7
-SCALE = np.array([ARM_MM, ARM_MM, ARM_MM, 1.0, 1.0, 1.0])
+SCALE = np.array([CHARACTERISTIC_LENGTH_MM, CHARACTERISTIC_LENGTH_MM, CHARACTERISTIC_LENGTH_MM, 1.0, 1.0, 1.0])
 
 
 def screw(joint: Joint, axis: FloatArray, place: FloatArray) -> FloatArray:

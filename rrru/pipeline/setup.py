@@ -54,7 +54,7 @@ def as_measured(
     measurements = register_measurements(measurements, robot)
     known = measurements[rows.usable(measurements)]
     actuators = rows.actuators(known, robot)
-    result: Robot = robot.seen_at(actuators, rows.command(known), rows.readings(known, robot.angle_arm_mm))
+    result: Robot = robot.seen_at(actuators, rows.command(known), rows.readings(known, robot.characteristic_length_mm))
     return result
 
 

@@ -107,9 +107,11 @@ def _without(side: Side, fold: pd.DataFrame, calibration: str) -> tuple[Robot, n
     seen = _rows_of(measurements, fold)
     if not seen.any():
         return robot, deviation_vector(side.frames["parameters"], calibration, METHOD, robot)
-    arm_mm = side.saved["arm_mm"] or np.nan
+    characteristic_length_mm = side.saved["arm_mm"] or np.nan
     remaining = rows.hold_out(measurements, seen)
-    residuals = select(remaining, robot, side.settings.sets[calibration], side.settings.use_near_singularity, arm_mm)
+    residuals = select(
+        remaining, robot, side.settings.sets[calibration], side.settings.use_near_singularity, characteristic_length_mm
+    )
     if residuals is None:
         raise FitError(f"{side.name}: too few points are left")
     fit = calibrate(residuals, side.saved["noise_mm"], side.settings.loss, side.settings.loss_scale_mm)

@@ -42,7 +42,7 @@ def cable(
         legs=Legs((*bars, *([_plane(home)] if planar else [])), lengths, home),
         parts=bar_parts(bars),
         drive_range=np.stack([lengths - stroke_mm, lengths + stroke_mm], axis=1),
-        angle_arm_mm=float(np.linalg.norm(platform, axis=1).mean()) or 100.0,
+        characteristic_length_mm=float(np.linalg.norm(platform, axis=1).mean()) or 100.0,
         **options,
     )
 

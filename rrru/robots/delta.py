@@ -85,7 +85,7 @@ class Delta(Tripod):
             )
 
     @property
-    def angle_arm_mm(self) -> float:
+    def characteristic_length_mm(self) -> float:
         """Length that makes deviations of angles comparable with those of lengths."""
         return self.l1_mm
 

@@ -39,7 +39,7 @@ def hexapod(
         legs=Legs(bars, lengths, home),
         parts=bar_parts(bars),
         drive_range=np.stack([lengths - stroke_mm, lengths + stroke_mm], axis=1),
-        angle_arm_mm=float(np.linalg.norm(platform, axis=1).mean()),
+        characteristic_length_mm=float(np.linalg.norm(platform, axis=1).mean()),
         **options,
     )
 

@@ -97,7 +97,7 @@ class Ptt3(Tripod):
             raise ConfigError(f"ptt3: rail_inclination_rad is {self.rail_inclination_rad}; allowed: 0 to pi / 2")
 
     @property
-    def angle_arm_mm(self) -> float:
+    def characteristic_length_mm(self) -> float:
         """Length that makes deviations of angles comparable with those of lengths."""
         return self.R_mm
 

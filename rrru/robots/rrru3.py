@@ -83,7 +83,7 @@ class Rrru3(ThreeLegs):
     )
 
     @property
-    def angle_arm_mm(self) -> float:
+    def characteristic_length_mm(self) -> float:
         """Length that makes deviations of angles comparable with those of lengths."""
         return self.L1_mm
 

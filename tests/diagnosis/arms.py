@@ -74,7 +74,9 @@ def measure(effects=(), count=200, seed=1, noise=(NOISE_MM, NOISE_RAD)):
 def problem_of(frame, *names, library=None):
     """The problem of a table, with some effects of the library, at the noise that it has."""
     effects = {name: find(name, ARM) for name in names} | (library or {})
-    return make_diagnosis_problem(frame, reading(frame), MASSES, NOISE_MM, effects, arm_mm=NOISE_MM / NOISE_RAD)
+    return make_diagnosis_problem(
+        frame, reading(frame), MASSES, NOISE_MM, effects, characteristic_length_mm=NOISE_MM / NOISE_RAD
+    )
 
 
 def reading(frame):

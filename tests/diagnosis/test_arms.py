@@ -47,7 +47,7 @@ def test_distances_are_those_of_positions_where_orientations_are_read_too():
     robot = MeasuredRobot(arms.reading(frame), arms.MASSES, noise[0], "arm", noise[1])
     found = diagnose(frame, robot, GapSettings(("encoder_eccentricity",), draws=50))
     problem = found.inference.problem
-    assert problem.arm_mm == pytest.approx(5000.0)
+    assert problem.characteristic_length_mm == pytest.approx(5000.0)
     left = problem.left(found.inference.calibrated)[: len(frame)]
     squares = (left**2).sum(axis=1) - 3.0 * noise[0] ** 2
     true = np.sqrt(squares.mean())

@@ -66,7 +66,7 @@ def _diagnosed(measured, effects=None):
 def test_a_missing_effect_does_not_pass_for_noise_of_the_orientations_alone(measured):
     """The ratio of both noises is nearly right even where the library lacks what acts."""
     found = _diagnosed(measured, _LACKING)
-    assert found.inference.problem.arm_mm == pytest.approx(_NOISE_MM / _NOISE_RAD, rel=0.5)
+    assert found.inference.problem.characteristic_length_mm == pytest.approx(_NOISE_MM / _NOISE_RAD, rel=0.5)
 
 
 def test_a_constant_lead_error_is_no_growth(measured):

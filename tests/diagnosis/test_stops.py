@@ -109,7 +109,9 @@ def _campaign(scatter_mm, seed=1, turned=False):
 
 def _problem(table):
     library = {name: find(name, arms.ARM) for name in ("drive_compliance", "encoder_eccentricity")}
-    return make_diagnosis_problem(table, arms.reading(table), arms.MASSES, 0.02, library, arm_mm=500.0)
+    return make_diagnosis_problem(
+        table, arms.reading(table), arms.MASSES, 0.02, library, characteristic_length_mm=500.0
+    )
 
 
 @pytest.mark.parametrize(("scatter_mm", "share"), [(0.0, 0.0), (0.02, 0.5), (0.06, 0.9)])

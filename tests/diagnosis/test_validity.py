@@ -19,7 +19,7 @@ def _of_arm(frame):
     """Diagnosis of a table of the arm."""
     robot = arms.reading(frame)
     robot = robot.seen_at(
-        rows.actuators(frame, robot), rows.command(frame), rows.readings(frame, arms.ARM.angle_arm_mm)
+        rows.actuators(frame, robot), rows.command(frame), rows.readings(frame, arms.ARM.characteristic_length_mm)
     )
     return diagnose(frame, MeasuredRobot(robot, arms.MASSES, arms.NOISE_MM, "arm", arms.NOISE_RAD), _EFFECTS)
 

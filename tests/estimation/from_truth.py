@@ -69,8 +69,10 @@ def problem_of(campaign):
     """The DiagnosisProblem of a RandomCampaign, as of a user's file, without ingest."""
     table = unregistered_table(campaign)
     robot = with_wide_bounds(setup.as_measured(campaign.robot, table, registered=True))
-    arm_mm = robot.angle_arm_mm if campaign.turn is not None else np.nan
-    problem = make_diagnosis_problem(table, robot, _NO_LOADS, NOISE_MM, {}, arm_mm=arm_mm)
+    characteristic_length_mm = robot.characteristic_length_mm if campaign.turn is not None else np.nan
+    problem = make_diagnosis_problem(
+        table, robot, _NO_LOADS, NOISE_MM, {}, characteristic_length_mm=characteristic_length_mm
+    )
     return replace(problem, library={FRAMES: frames(robot)})
 
 

@@ -25,7 +25,12 @@ def _measured(seed, tilt_rad=2.0, noise_mm=_NOISE_MM, turned=False):
     tool, orientations = Rotation.random(rng=draw).as_matrix(), None
     if turned:
         orientations = rotation.T @ turn @ tool
-    return TargetReadings(body, turn, seen, target, _UNKNOWN, turn=orientations, arm_mm=300.0), rotation, shift, tool
+    return (
+        TargetReadings(body, turn, seen, target, _UNKNOWN, turn=orientations, characteristic_length_mm=300.0),
+        rotation,
+        shift,
+        tool,
+    )
 
 
 def _turns(draw, tilt_rad):

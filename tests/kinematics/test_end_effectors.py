@@ -265,6 +265,6 @@ def test_orientation_of_each_hand_is_read():
     twists[0, numbers["left flange"], 3:] = [0.01, -0.02, 0.005]
     turn = poses.turn.copy()
     turn[ARM == "left"] = turn[ARM == "left"] @ Rotation.from_rotvec([0.01, -0.02, 0.005]).as_matrix()
-    readings = Readings(_own(), turn=turn, arm_mm=500.0)
+    readings = Readings(_own(), turn=turn, characteristic_length_mm=500.0)
     left = lacking(ROBOT, readings, ROBOT.solve(DRIVES, _own(), twists), twists)
     np.testing.assert_allclose(left, 0.0, atol=1e-6)

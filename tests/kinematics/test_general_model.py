@@ -317,13 +317,13 @@ def test_the_translational_measure_is_that_of_the_drives_jacobian(name):
     at = robot.map_at(actuators, points)
     size = np.linalg.svd(robot.actuator_jacobian(points, actuators), compute_uv=False)
     np.testing.assert_allclose(at.translational_measure(1.0), size[:, -1] / size[:, 0], rtol=1e-9)
-    measure, determinant = at.constraint_measures(robot.angle_arm_mm)
+    measure, determinant = at.constraint_measures(robot.characteristic_length_mm)
     assert (measure > 1e-3).all() and (measure < 1.0).all() and (np.abs(determinant) > 0.0).all()
 
 
 def test_bars_keep_the_sign_of_the_constraint_determinant_where_nothing_is_singular():
     robot, points, actuators = _clear("delta")
-    _, determinant = robot.map_at(actuators, points).constraint_measures(robot.angle_arm_mm)
+    _, determinant = robot.map_at(actuators, points).constraint_measures(robot.characteristic_length_mm)
     assert np.unique(np.sign(determinant)).size == 1
 
 
@@ -331,7 +331,7 @@ def test_the_general_constraint_measure_vanishes_where_the_closed_ones_determina
     robot = Rrru3()
     points = np.stack([np.linspace(-800.0, -700.0, 101), np.zeros(101), np.full(101, 600.0)], axis=1)
     actuators = robot.inverse(points)
-    measure, _ = robot.map_at(actuators, points).constraint_measures(robot.angle_arm_mm)
+    measure, _ = robot.map_at(actuators, points).constraint_measures(robot.characteristic_length_mm)
     change = np.flatnonzero(np.diff(np.sign(singularity.constraint_determinant(robot, points, actuators))))
     assert len(change) == 1 and measure.argmin() in (change[0], change[0] + 1)
     assert measure.min() < 0.05 * measure.max()
@@ -339,7 +339,7 @@ def test_the_general_constraint_measure_vanishes_where_the_closed_ones_determina
 
 def test_the_general_constraint_measure_vanishes_in_the_plane_of_level_rails():
     robot, points = Ptt3(), np.array([[20.0, 10.0, -200.0], [20.0, 10.0, -0.5], [20.0, 10.0, -0.05]])
-    measure, _ = robot.map_at(robot.inverse(points), points).constraint_measures(robot.angle_arm_mm)
+    measure, _ = robot.map_at(robot.inverse(points), points).constraint_measures(robot.characteristic_length_mm)
     assert measure[0] > 0.01 and measure[1] < 0.01 * measure[0] and measure[2] < 0.11 * measure[1]
 
 

@@ -16,7 +16,7 @@ from rrru.kinematics.robot import Robot
 from tests.kinematics.test_general_model import GENERAL, ROBOTS, _about_home, _clear
 
 _REFLECTORS = {"ball a": (60.0, 0.0, 40.0), "ball b": (-30.0, 50.0, 45.0), "ball c": (-30.0, -50.0, 90.0)}
-_ARM_MM = 300.0
+_CHARACTERISTIC_LENGTH_MM = 300.0
 _STEPS = np.repeat([1e-2, 1e-5], 3)
 
 
@@ -63,7 +63,9 @@ def setting(request):
     position, turn = _predicted(robot, poses, twists, names, places, table)
     turn = Rotation.from_rotvec(generator.normal(size=(len(points), 3)) * 3e-3).as_matrix() @ turn
     turn[::2] = np.nan
-    readings = Readings(position + generator.normal(size=position.shape), names, places, turn, _ARM_MM, table)
+    readings = Readings(
+        position + generator.normal(size=position.shape), names, places, turn, _CHARACTERISTIC_LENGTH_MM, table
+    )
     return robot, readings, actuators, twists, poses
 
 
@@ -76,7 +78,7 @@ def test_what_is_lacking_is_read_minus_predicted(setting):
     odd = np.arange(1, 100, 2)
     np.testing.assert_array_equal(readings.rows, [*range(100), *odd])
     # the rotation vector that is lacking, applied to the model's orientation, gives the one that was read
-    again = Rotation.from_rotvec(result[100:] / _ARM_MM).as_matrix() @ turn[odd]
+    again = Rotation.from_rotvec(result[100:] / _CHARACTERISTIC_LENGTH_MM).as_matrix() @ turn[odd]
     np.testing.assert_allclose(again, readings.turn[odd], rtol=0.0, atol=1e-12)
 
 
@@ -118,7 +120,7 @@ def _read(robot, actuators, points, truth, turned):
     twists = robot.twists(robot.parameters.vector(truth))
     names, places = _reflectors(len(points))
     position, turn = _predicted(robot, robot.solve(actuators, points, twists), twists, names, places)
-    return Readings(position, names, places, turn if turned else None, _ARM_MM)
+    return Readings(position, names, places, turn if turned else None, _CHARACTERISTIC_LENGTH_MM)
 
 
 def _off(robot, points, actuators, turned):
@@ -128,7 +130,7 @@ def _off(robot, points, actuators, turned):
     values = np.random.default_rng(9).normal(size=len(sizes)) * sizes
     readings = _read(robot, actuators, points, dict(zip(robot.parameters.names, values.tolist(), strict=True)), turned)
     fit = calibrate(TargetPositions(robot, actuators, readings.position_mm, points, readings))
-    arm = np.where(np.array(robot.parameters.units) == "rad", robot.angle_arm_mm, 1.0)
+    arm = np.where(np.array(robot.parameters.units) == "rad", robot.characteristic_length_mm, 1.0)
     return robot, fit, np.abs((fit.deviations - values) * arm)
 
 
@@ -198,7 +200,9 @@ def test_orientations_alone_do_not_depend_on_the_places_of_reflectors():
     """Of a robot with reflectors only the tool and the orientation are read: a reflector's twist changes nothing."""
     robot, points, actuators = _poses("hexapod")
     poses = robot.solve(actuators, points)
-    at = robot.map(actuators, poses, readings=Readings(points, turn=poses.turn, arm_mm=_ARM_MM))
+    at = robot.map(
+        actuators, poses, readings=Readings(points, turn=poses.turn, characteristic_length_mm=_CHARACTERISTIC_LENGTH_MM)
+    )
     assert not at.effect("ball a").any()
 
 

@@ -91,5 +91,5 @@ def test_the_legs_bear_any_load_and_the_free_arm_none_about_its_axis(robot, pose
     axis = turn @ next(joint.axis for joint in robot.legs.joints if joint.name == "theta2")
     torque = ((both[:, 3:] - np.cross(place, both[:, :3])) * axis).sum(axis=1)
     assert np.abs(torque).max() < 1e-6 * np.abs(both[:, 3:]).max()
-    measure, _ = at.constraint_measures(robot.angle_arm_mm)
+    measure, _ = at.constraint_measures(robot.characteristic_length_mm)
     assert (measure > 1e-3).all()

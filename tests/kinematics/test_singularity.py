@@ -73,10 +73,10 @@ def test_workspace_slice_is_reachable_exactly_where_the_inverse_exists():
 
 def test_the_measure_of_a_scara_is_that_of_its_two_links_and_its_slide():
     """Closed form: the planar Jacobian of two links by the characteristic length, and 1 for the slide; see Craig."""
-    links, arm_mm = (400.0, 300.0), 500.0
+    links, characteristic_length_mm = (400.0, 300.0), 500.0
     dh = [{"a_mm": links[0], "range_deg": [-170, 170]}, {"a_mm": links[1], "alpha_deg": 180, "range_deg": [-170, 170]}]
     robot = make_mechanism("scara", {"dh": [*dh, {"sliding": True, "range_mm": [0, 200]}]})
-    assert robot.angle_arm_mm == arm_mm
+    assert robot.characteristic_length_mm == characteristic_length_mm
     drives = np.random.default_rng(3).uniform([-2.0, -2.5, 10.0], [2.0, 2.5, 190.0], (50, 3))
     drives[0, 1] = 0.0  # stretched
     measure, *_ = robot.singularities(robot.forward(drives), drives)
@@ -84,7 +84,9 @@ def test_the_measure_of_a_scara_is_that_of_its_two_links_and_its_slide():
         upper, lower = links[0] * np.exp(1j * first), links[1] * np.exp(1j * (first + second))
         planar = [1j * (upper + lower), 1j * lower]
         jacobian = np.zeros((3, 3))
-        jacobian[:2, :2] = np.array([[one.real for one in planar], [one.imag for one in planar]]) / arm_mm
+        jacobian[:2, :2] = (
+            np.array([[one.real for one in planar], [one.imag for one in planar]]) / characteristic_length_mm
+        )
         jacobian[2, 2] = 1.0
         size = np.linalg.svd(jacobian, compute_uv=False)
         assert found == pytest.approx(size[-1] / size[0], abs=1e-9)

@@ -15,8 +15,8 @@ from rrru.kinematics.closure import Closure
 from rrru.kinematics.legs import cross, turn_about
 from rrru.kinematics.wrenches import screw
 
-_ARM_MM = 500.0
-_SCALE = np.repeat([_ARM_MM, 1.0], 3)
+_CHARACTERISTIC_LENGTH_MM = 500.0
+_SCALE = np.repeat([_CHARACTERISTIC_LENGTH_MM, 1.0], 3)
 _LONGEST_MM, _LONGEST_RAD = 150.0, 0.3
 
 
@@ -41,7 +41,7 @@ def solve(legs, actuators, start, twists=None):
         position[rows] += share * shift
         turn[rows] = Rotation.from_rotvec(share * rotation).as_matrix() @ turn[rows]
         passive[rows] += share * change
-        left[rows] = np.maximum(np.maximum(moved, slid), _ARM_MM * turned)
+        left[rows] = np.maximum(np.maximum(moved, slid), _CHARACTERISTIC_LENGTH_MM * turned)
         rows = rows[~(left[rows] < 1e-10)]
     closed = left < 1e-7
     for part in (position, turn, passive):
@@ -85,9 +85,9 @@ def _step(legs, ranks, actuators, poses, twists):
         if leg.bar:
             near, far, length = bar_ends(legs, leg, way, poses, actuators, twists)
             line = (far - near) / np.linalg.norm(far - near, axis=1, keepdims=True)
-            line = np.concatenate([line, cross(near, line)], axis=1) * _SCALE / _ARM_MM
+            line = np.concatenate([line, cross(near, line)], axis=1) * _SCALE / _CHARACTERISTIC_LENGTH_MM
             total = total + line[:, :, None] * line[:, None, :]
-            pull = pull + line * (length - np.linalg.norm(far - near, axis=1))[:, None] / _ARM_MM
+            pull = pull + line * (length - np.linalg.norm(far - near, axis=1))[:, None] / _CHARACTERISTIC_LENGTH_MM
         else:
             u, size, v = np.linalg.svd(_passive_screws(leg, way) / _SCALE[:, None], full_matrices=False)
             u, size, v = u[:, :, :rank], size[:, None, :rank], v[:, :rank]

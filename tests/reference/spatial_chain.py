@@ -18,7 +18,7 @@ AZIMUTH = np.radians([0.0, 120.0, 240.0])
 PLACES = ("root", "foot", "drive", "elbow", "knee", "wrist", "cross", "platform")
 LENGTHS = np.tile([400.0, 400.0, 100.0, 800.0, 400.0], (3, 1))
 # the rotation part of a closure counts as the distance that it makes at this arm
-_ARM_MM = 500.0
+_CHARACTERISTIC_LENGTH_MM = 500.0
 
 
 def moves(rotation_vectors, shifts):
@@ -78,7 +78,7 @@ def closure(lengths, displacements, theta, passive, azimuth=AZIMUTH):
         poses.append(pose)
         for joint in range(1, 5):
             moved = np.cross(axes[:, joint], pose[:, :3, 3] - places[:, joint])
-            column = np.concatenate([moved, _ARM_MM * axes[:, joint]], axis=1)
+            column = np.concatenate([moved, _CHARACTERISTIC_LENGTH_MM * axes[:, joint]], axis=1)
             # the first leg closes both loops, the others one each
             for loop in (0, 1):
                 if leg in (0, loop + 1):
@@ -88,7 +88,7 @@ def closure(lengths, displacements, theta, passive, azimuth=AZIMUTH):
         apart = poses[0][:, :3, :3] @ poses[loop + 1][:, :3, :3].transpose(0, 2, 1)
         turned = 0.5 * np.stack([apart[:, i, j] - apart[:, j, i] for i, j in ((2, 1), (0, 2), (1, 0))], axis=1)
         residual[:, 6 * loop : 6 * loop + 3] = poses[0][:, :3, 3] - poses[loop + 1][:, :3, 3]
-        residual[:, 6 * loop + 3 : 6 * loop + 6] = _ARM_MM * turned
+        residual[:, 6 * loop + 3 : 6 * loop + 6] = _CHARACTERISTIC_LENGTH_MM * turned
     return residual, jacobian, poses[0]
 
 
@@ -108,4 +108,4 @@ def closure_determinant(theta, passive):
     """Determinant (n,) of the nominal robot's Jacobian (12, 12); lengths count in units of 500 mm."""
     residual, jacobian, _ = closure(LENGTHS, np.zeros((1, 3, len(PLACES), 6)), theta, passive)
     assert np.abs(residual).max() < 1e-6
-    return np.linalg.det(jacobian / _ARM_MM)
+    return np.linalg.det(jacobian / _CHARACTERISTIC_LENGTH_MM)

@@ -217,7 +217,7 @@ class GrossFile:
 
     def _spread(self, readings: TargetReadings) -> float:
         """Spread of the poses that carry the targets; turns count by the robot's characteristic length."""
-        turn = self.robot.angle_arm_mm * _spread(readings.body_turn.reshape(-1, 9)) / np.sqrt(2.0)
+        turn = self.robot.characteristic_length_mm * _spread(readings.body_turn.reshape(-1, 9)) / np.sqrt(2.0)
         return float(np.hypot(_spread(readings.body_mm), turn))
 
     def _log_evidence(self, mistakes: Mistakes, share: float, count: int) -> float:

@@ -114,7 +114,7 @@ def _fitted(
     # frame and reflectors first: the drives explain the remainder
     opened = open_numbers(reads)
     numbers = (*opened, *candidates_of(robot.legs, robot.parts)[: len(robot.parts.drives)])
-    scale = np.array([1.0 if number.unit == "mm" else 1.0 / robot.angle_arm_mm for number in numbers])
+    scale = np.array([1.0 if number.unit == "mm" else 1.0 / robot.characteristic_length_mm for number in numbers])
     directions = scale * np.stack([direction(robot.legs, number) for number in numbers], axis=-1)
     columns = robot.map(values, poses, robot.twists(), readings).columns(directions)
     chosen, _ = choose(columns.reshape(-1, len(numbers)), [True] * len(numbers), _LEAST)

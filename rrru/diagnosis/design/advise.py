@@ -152,7 +152,12 @@ def _as_realized(row: Row, seen: tuple[float, Mapping[str, float]]) -> Row:
 def _planned(problem: DiagnosisProblem, table: pd.DataFrame, masses: Masses) -> DiagnosisProblem:
     """The problem of a table of planned runs."""
     return make_diagnosis_problem(
-        table, problem.mechanism, masses, problem.noise_mm, problem.effects, arm_mm=problem.arm_mm
+        table,
+        problem.mechanism,
+        masses,
+        problem.noise_mm,
+        problem.effects,
+        characteristic_length_mm=problem.characteristic_length_mm,
     )
 
 

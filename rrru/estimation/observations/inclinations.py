@@ -119,7 +119,7 @@ class Inclinations:
         seen, turn = self._up_in_sensor(values)
         up, by_tilt = self._up_in_base(values[-2:])
         poses, twists = self._poses(values[:-2])
-        readings = Readings(self.start_mm, turn=np.tile(np.eye(3), (len(self), 1, 1)), arm_mm=1.0)
+        readings = Readings(self.start_mm, turn=np.tile(np.eye(3), (len(self), 1, 1)), characteristic_length_mm=1.0)
         # readings of orientations have this kind of map
         at = cast(ReadingMap, self.mechanism.map(self.actuators, poses, twists, readings))
         turned = at.turn_columns(self._directions)

@@ -51,7 +51,7 @@ def costs(measurements: pd.DataFrame, config: Mapping[str, Any], section: Mappin
             section.get("noise_mm") or 1.0,
             library,
             True,
-            robot.angle_arm_mm,
+            robot.characteristic_length_mm,
         )
     except RrruError as error:
         return [*said, f"no diagnosis: {error}"]

@@ -31,7 +31,7 @@ def calibrate(
     """
     robot, noise = setup.measured_robot(settings["nominal"], measurements), _noise(campaigns)
     calibration = campaign_fit.CalibrationSettings.from_config(settings["calibration"])
-    fits = campaign_fit.fit_sets(measurements, robot, calibration, noise.mm, noise.arm_mm)
+    fits = campaign_fit.fit_sets(measurements, robot, calibration, noise.mm, noise.characteristic_length_mm)
     truth = setup.true_deviations(robot, settings["truth"])
     gauge = pd.DataFrame(list(robot.gauge.items()), columns=["number", "stands_for"])
     frames = {"gauge": gauge.assign(campaign=settings["campaign"])}
@@ -43,7 +43,7 @@ def write(
 ) -> None:
     """Write the frames of `calibrate`, and paths["robot"], to paths by table name."""
     noise = _noise(campaigns)
-    fitted = {"noise_mm": noise.mm, "arm_mm": noise.arm_mm, "calibration": settings["calibration"]}
+    fitted = {"noise_mm": noise.mm, "arm_mm": noise.characteristic_length_mm, "calibration": settings["calibration"]}
     json_files.write({"nominal": settings["nominal"], **fitted}, paths["robot"])
     tables.write_all(TABLES, frames, paths)
 

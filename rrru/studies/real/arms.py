@@ -17,7 +17,7 @@ from rrru.campaign import measurements as rows
 from rrru.campaign.ingest.campaign_file import ingest
 from rrru.campaign.ingest.spec import IngestSpec
 from rrru.diagnosis.diagnose import Diagnosis, MeasuredRobot, diagnose, with_wide_bounds
-from rrru.diagnosis.inference import with_arm
+from rrru.diagnosis.inference import with_characteristic_length
 from rrru.diagnosis.make_problem import make_diagnosis_problem
 from rrru.diagnosis.problem import DiagnosisProblem
 from rrru.diagnosis.settings import GapSettings
@@ -176,12 +176,18 @@ def _reference(known: Prepared) -> tuple[DiagnosisProblem, tuple[Step, ...]]:
     """The problem of the reference models of a series, and these models, each fitted to its training rows."""
     nominal, measurements = with_wide_bounds(known.robot), known.measurements
     turned = rows.has_turns(measurements)
-    arm_mm = nominal.angle_arm_mm if turned else np.nan
+    characteristic_length_mm = nominal.characteristic_length_mm if turned else np.nan
     problem = make_diagnosis_problem(
-        measurements, nominal, NO_MASSES, known.noise[0] or 1.0, library_effects(nominal), True, arm_mm
+        measurements,
+        nominal,
+        NO_MASSES,
+        known.noise[0] or 1.0,
+        library_effects(nominal),
+        True,
+        characteristic_length_mm,
     )
     if turned:
-        problem = with_arm(problem, *known.noise)
+        problem = with_characteristic_length(problem, *known.noise)
     made = steps(problem)
     if turned:
         _check_turned(known.series, problem, next(step for step in made if step.model == "b").state)
@@ -190,7 +196,10 @@ def _reference(known: Prepared) -> tuple[DiagnosisProblem, tuple[Step, ...]]:
 
 def _check_turned(series: Series, problem: DiagnosisProblem, state: ModelState) -> None:
     """Raise ConfigError where the orientations of the calibrated robot disagree with the measured ones."""
-    off_rad = float(np.median(np.linalg.norm(problem.residual(state)[~problem.positions], axis=1)) / problem.arm_mm)
+    off_rad = float(
+        np.median(np.linalg.norm(problem.residual(state)[~problem.positions], axis=1))
+        / problem.characteristic_length_mm
+    )
     if off_rad > _MAX_ORIENTATION_RAD:
         raise ConfigError(
             f"{series.file}: orientations have errors of {off_rad:.2g} rad after calibration; allowed: "

@@ -35,15 +35,15 @@ _COLUMNS = ("campaign", "carried_from", "frames_rms_mm", "geometry_rms_mm", "cau
 class Model:
     """The model of a studied series for transfer: its measurements, robot and estimates.
 
-    arm_mm: of orientations, NaN where none were read; noise_mm: per axis; geometry (p,), deviations (p,): of the
-    calibration alone and together with the causes; effects: these by name, with values by parameter;
+    characteristic_length_mm: of orientations, NaN where none were read; noise_mm: per axis; geometry (p,), deviations
+    (p,): of the calibration alone and together with the causes; effects: these by name, with values by parameter;
     weight: estimated errors of payload and tilt.
     """
 
     series: Series
     measurements: pd.DataFrame
     robot: Robot
-    arm_mm: float
+    characteristic_length_mm: float
     noise_mm: float
     geometry: np.ndarray
     deviations: np.ndarray
@@ -61,7 +61,7 @@ def saved_values(studied: Studied) -> dict[str, Any]:
         if effect.name not in UNKNOWN:
             effects[effect.name] = {"values": np.asarray(values).tolist(), "waves": effect.waves}
     return {
-        "arm_mm": float(problem.arm_mm),
+        "arm_mm": float(problem.characteristic_length_mm),
         "noise_mm": float(problem.noise_mm),
         "geometry": studied.step("b").state.deviations.tolist(),
         "deviations": state.deviations.tolist(),
@@ -98,8 +98,10 @@ def carried(models: Sequence[Model]) -> pd.DataFrame:
 def _row(first: Model, second: Model) -> dict:
     """The row of the model of one series on another one."""
     robot = with_wide_bounds(first.robot)
-    arm_mm = second.arm_mm if rows.has_turns(second.measurements) else np.nan
-    problem = make_diagnosis_problem(second.measurements, robot, NO_MASSES, second.noise_mm, {}, True, arm_mm)
+    characteristic_length_mm = second.characteristic_length_mm if rows.has_turns(second.measurements) else np.nan
+    problem = make_diagnosis_problem(
+        second.measurements, robot, NO_MASSES, second.noise_mm, {}, True, characteristic_length_mm
+    )
     effects = {
         name: replace(effect, coordinates=plain_coordinates(effect.parameters, 1.0))
         for name, (effect, _) in first.effects.items()

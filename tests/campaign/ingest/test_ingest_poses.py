@@ -81,7 +81,7 @@ def _as_read(robot, found, registered=True, known=()):
     """The robot whose parameters hold what the readings leave open."""
     table = found.measurements
     robot = robot.reading(rows.reads(table, known, registered))
-    readings = rows.readings(table, robot.angle_arm_mm)
+    readings = rows.readings(table, robot.characteristic_length_mm)
     return robot.seen_at(rows.actuators(table, robot), rows.command(table), readings)
 
 
@@ -136,7 +136,7 @@ def test_deviations_are_found_beside_frame_tool_and_noise(arm, driven, tmp_path)
     assert len(robot.parameters) == 30  # 4 R + 6, Mooring, Roth and Driels 1991
     noise = campaign_noise(robot, found.measurements, (None, None))
     assert noise.mm == pytest.approx(_NOISE_MM, rel=0.2) and noise.rad == pytest.approx(_NOISE_RAD, rel=0.2)
-    residuals = select(found.measurements, robot, ["*"], True, noise.arm_mm)
+    residuals = select(found.measurements, robot, ["*"], True, noise.characteristic_length_mm)
     fit = calibrate(residuals, _NOISE_MM)
     assert fit.rms_mm == pytest.approx(np.sqrt(3.0) * _NOISE_MM, rel=0.15)
     assert fit.turn_rms_rad == pytest.approx(np.sqrt(3.0) * _NOISE_RAD, rel=0.15)

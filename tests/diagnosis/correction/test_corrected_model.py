@@ -222,7 +222,7 @@ def attached(tmp_path_factory):
         tables_read.append(pd.DataFrame(columns | numbers | timed))
     frame = pd.concat(tables_read, ignore_index=True)
     robot = given.reading(rows.reads(frame, _STATED_MM)).seen_at(
-        rows.actuators(frame, given), rows.command(frame), rows.readings(frame, given.angle_arm_mm)
+        rows.actuators(frame, given), rows.command(frame), rows.readings(frame, given.characteristic_length_mm)
     )
     known = MeasuredRobot(robot, _MASSES, _NOISE_MM, "attached")
     result = diagnose(frame, known, GapSettings(("backlash",), draws=20))

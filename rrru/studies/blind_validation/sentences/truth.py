@@ -98,7 +98,9 @@ def truth_of(draw, run, folder):
     exact = _as_read(draw, run, draw.readings(poses), folder)
     library = run.library(problem.mechanism)
     # with the effects as fitted: all readings together could allow more orders of a drive error function
-    whole = make_diagnosis_problem(exact, problem.mechanism, run.masses, draw.noise_mm, library, True, problem.arm_mm)
+    whole = make_diagnosis_problem(
+        exact, problem.mechanism, run.masses, draw.noise_mm, library, True, problem.characteristic_length_mm
+    )
     whole = replace(whole, library=whole.library | problem.library)
     count = len(exact)
     before = whole.left(ModelState(inference.calibrated.deviations, {}))[:count]
@@ -190,7 +192,13 @@ def _calibrated(draw, run, exact):
     """Deviations (p,) of a plain calibration of exact readings, and its position residuals (n, 3)."""
     problem = run.diagnosis.inference.problem
     own = make_diagnosis_problem(
-        exact.reset_index(drop=True), problem.mechanism, run.masses, draw.noise_mm, {}, True, problem.arm_mm
+        exact.reset_index(drop=True),
+        problem.mechanism,
+        run.masses,
+        draw.noise_mm,
+        {},
+        True,
+        problem.characteristic_length_mm,
     )
     state = calibrate(own)
     return np.asarray(state.deviations), own.left(state)[: len(exact)]
