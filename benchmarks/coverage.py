@@ -79,7 +79,7 @@ def state_of(campaign, frame, noise_mm, draws=_RESAMPLES):
     settings = GapSettings(effects=campaign.library.offered, draws=draws)
     found = diagnose(frame, known, settings, details=False)
     inference, estimate = found.inference, found.inference.fit.estimate
-    terms, geometry = inference.hypothesis.terms, estimate.parameters.places[GEOMETRY]
+    terms, geometry = inference.hypothesis.terms, estimate.parameters.slices[GEOMETRY]
     strengths = inference.hypothesis.strengths_of(terms, inference.level)
     prediction = inference.held_out.predict(terms, strengths, inference.level)
     expected = np.sum(prediction.left_mm2, axis=1) + prediction.uncertainty_mm2

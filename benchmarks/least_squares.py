@@ -27,7 +27,7 @@ def fitted(function, count):
 
 def measured(robot, actuators, start_mm, turn_rad=2e-4, length_mm=0.2):
     """Residuals of a robot with small errors of all its parameters, and noise."""
-    robot, draw = robot.seen_at(actuators, start_mm), np.random.default_rng(5)
+    robot, draw = robot.with_identifiable_parameters(actuators, start_mm), np.random.default_rng(5)
     sizes = [length_mm if unit == "mm" else turn_rad for unit in robot.parameters.units]
     real = robot.forward(actuators, sizes * draw.standard_normal(len(sizes)), start_mm)
     return TargetPositions(robot, actuators, real + draw.normal(0.0, _NOISE_MM, real.shape), start_mm)

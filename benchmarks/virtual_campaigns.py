@@ -280,16 +280,16 @@ def pose_campaign(robot, count, noise_mm, acting, repeats, generator):
 
 def _with_parameters(robot, scene, commands):
     """The robot with the parameters identifiable from the commands; in an open scene also with others."""
-    nominal, reads = nominal_robot(robot), rows.reads(commands)
+    nominal, reads = nominal_robot(robot), rows.measurement_config(commands)
     if scene.open and robot == "rrru3":
         # with a platform that never rotates, the places of a target and of the frame are not separately identifiable
         reads = MeasurementConfig(("reflector a",), ("reflector a",), frame=True)
     if reads.reflectors:
-        nominal = nominal.reading(reads)
+        nominal = nominal.with_measurement_config(reads)
     if scene.open:
         return nominal
     readings = rows.readings(_read_as_commanded(commands), nominal.characteristic_length_mm)
-    return nominal.seen_at(rows.actuators(commands, nominal), rows.command(commands), readings)
+    return nominal.with_identifiable_parameters(rows.actuators(commands, nominal), rows.command(commands), readings)
 
 
 def _read_as_commanded(frame):

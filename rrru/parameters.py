@@ -105,11 +105,11 @@ class ParameterSet:
             raise ConfigError(f"expected {len(self)} values for {', '.join(self.names)}, got shape {vector.shape}")
         return dict(zip(self.names, vector.tolist(), strict=True))
 
-    def hold(self, vector: np.ndarray) -> bool:
+    def contains(self, vector: np.ndarray) -> bool:
         """Whether a vector (p,) lies within the bounds."""
         return bool(((vector >= self.low) & (vector <= self.high)).all())
 
-    def inside(self, vector: np.ndarray, margin: float = 1e-6) -> np.ndarray:
+    def clipped_inside(self, vector: np.ndarray, margin: float = 1e-6) -> np.ndarray:
         """Nearest vector (p,) within the bounds, off them by a share `margin` of their width."""
         inset = margin * (self.high - self.low)
         return np.clip(vector, self.low + inset, self.high - inset)

@@ -123,7 +123,7 @@ class Calibration:
     @property
     def turn_rms_rad(self) -> float:
         """Root mean square of the orientations' residual angles, NaN where none was read."""
-        if self.readings is None or not len(self.readings.turned):
+        if self.readings is None or not len(self.readings.oriented):
             return np.nan
         turns = self.residual_mm[len(self.readings) :] / self.readings.characteristic_length_mm
         return float(np.sqrt((turns**2).sum(axis=1).mean()))

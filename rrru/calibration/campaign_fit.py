@@ -48,7 +48,7 @@ def select(
     frame = register_measurements(measurements.loc[chosen], mechanism)
     actuators, command = rows.actuators(frame, mechanism), rows.command(frame)
     readings = rows.readings(frame, characteristic_length_mm)
-    mechanism = mechanism.seen_at(actuators, command, readings)
+    mechanism = mechanism.with_identifiable_parameters(actuators, command, readings)
     if 3 * len(frame) < len(mechanism.parameters):
         return None
     return TargetPositions(mechanism, actuators, rows.measured(frame), command, readings)

@@ -46,8 +46,8 @@ def least_mean_distance(residuals: TargetPositions, start: npt.ArrayLike, noise_
         )
         evaluations, best = evaluations + int(simplex.nfev), simplex.x
     deviations = start + seen @ best
-    if ident.rank == len(parameters) and not parameters.hold(deviations):
-        deviations, more = _bounded(residuals, parameters.inside(deviations))
+    if ident.rank == len(parameters) and not parameters.contains(deviations):
+        deviations, more = _bounded(residuals, parameters.clipped_inside(deviations))
         evaluations += more
     if not np.isfinite(residuals.mean_distance(deviations[None])[0]):
         raise FitError(f"least mean distance did not converge: {solution.message}", solution)

@@ -84,7 +84,9 @@ def on_the_world(measurements: pd.DataFrame) -> np.ndarray | None:
     return result if result.any() else None
 
 
-def reads(measurements: pd.DataFrame, known: Iterable[str] = (), registered: bool = False) -> MeasurementConfig:
+def measurement_config(
+    measurements: pd.DataFrame, known: Iterable[str] = (), registered: bool = False
+) -> MeasurementConfig:
     """The MeasurementConfig of a campaign; known: reflectors with stated places; registered: whether its frame was."""
     names = tuple(pd.unique(sites(measurements["target"]))) if "target" in measurements else ()
     stated = set(sites(pd.Series([*known], dtype=object)))

@@ -87,4 +87,4 @@ def reading_series(measurements: pd.DataFrame, readings: Readings | None = None)
     number = rows.series(measurements)
     if readings is None:
         return number
-    return np.concatenate([number, number.max() + number[readings.turned]])
+    return np.concatenate([number, number.max() + number[readings.oriented]])

@@ -156,7 +156,11 @@ def _fitted(effect: Effect, motion: Motion) -> bool:
     coordinates = effect.coordinates
     values = coordinates.to_values(np.array(coordinates.typical), coordinates.shapes[0])
     twists = np.asarray(effect.contribute(motion, values).twists)
-    return twists.ndim == 3 and len(twists) == 1 and not (twists[0].astype(bool) & ~motion.robot.offered).any()
+    return (
+        twists.ndim == 3
+        and len(twists) == 1
+        and not (twists[0].astype(bool) & ~motion.robot.candidate_components).any()
+    )
 
 
 def _unknown_approach(measurements: pd.DataFrame, mechanism: Robot, course: Course) -> BoolArray:

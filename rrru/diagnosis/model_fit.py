@@ -109,7 +109,7 @@ class EffectModel:
 
     def vector(self, state: ModelState) -> FloatArray:
         """Parameter vector (p,) of a ModelState; effects that it does not hold have coefficients of zero."""
-        values, places = self.parameters.mean.copy(), self.parameters.places
+        values, places = self.parameters.mean.copy(), self.parameters.slices
         values[places[GEOMETRY]] = state.deviations
         for term, matrix in zip(self.terms, self._matrices, strict=True):
             coordinates = state.effects.get((term.effect, term.shape))
@@ -125,7 +125,7 @@ class EffectModel:
     @last_cached
     def state(self, values: FloatArray) -> ModelState:
         """The ModelState of a parameter vector (p,)."""
-        places = self.parameters.places
+        places = self.parameters.slices
         pairs = zip(self.terms, self._matrices, strict=True)
         effects = {(t.effect, t.shape): matrix @ values[places[t.effect]] for t, matrix in pairs}
         shapes = {name: dict(shape) for name, shape in self.shapes.items()}
@@ -237,7 +237,7 @@ class ModelFit:
     def _places_of(self, term: EffectTerm) -> tuple[list[int], list[str]]:
         """Places of a term's coefficients and its effect's fitted shape parameters, and the names of these."""
         parameters, prefix = self.estimate.parameters, f"{term.effect}."
-        coefficients = np.arange(len(parameters))[parameters.places[term.effect]]
+        coefficients = np.arange(len(parameters))[parameters.slices[term.effect]]
         shapes = [name for name in parameters.names if name.startswith(prefix)]
         chosen = [*coefficients, *(parameters.names.index(name) for name in shapes)]
         return chosen, [name.removeprefix(prefix) for name in shapes]
@@ -245,7 +245,7 @@ class ModelFit:
     @property
     def weight(self) -> list[tuple[str, str, float, float]]:
         """Errors of payload and tilt, each (name, unit, value, standard error), empty where none was fitted."""
-        places = self.estimate.parameters.places
+        places = self.estimate.parameters.slices
         if WEIGHT not in places:
             return []
         (block,) = (block for block in self.estimate.parameters.blocks if block.name == WEIGHT)
@@ -254,7 +254,7 @@ class ModelFit:
 
     def one_sigma_steps(self) -> tuple[FloatArray, dict[EffectKey, FloatArray]]:
         """Independent errors of one standard deviation each: geometry (q, p), coordinates (q, c) by key of effect."""
-        places, count = self.estimate.parameters.places, len(self.estimate.parameters)
+        places, count = self.estimate.parameters.slices, len(self.estimate.parameters)
         names = (GEOMETRY, *(term.effect for term in self.terms))
         chosen = np.concatenate([np.arange(count)[places[name]] for name in names])
         covariance = self.estimate.covariance[np.ix_(chosen, chosen)]

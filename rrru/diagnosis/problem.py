@@ -30,7 +30,7 @@ from rrru.estimation.noise_model import NoiseModel
 from rrru.estimation.parameters import Block
 from rrru.kinematics.chain import Poses
 from rrru.kinematics.parameter_jacobian import TwistMap
-from rrru.kinematics.readings import Readings, lacking
+from rrru.kinematics.readings import Readings, reading_residual
 from rrru.kinematics.robot import Robot
 
 # name of the block of geometric errors
@@ -279,14 +279,14 @@ class DiagnosisProblem:
         The model is the exact closure where the state has effects, the calibrated one where it has none.
         """
         if self.readings is not None:
-            return lacking(self.mechanism, self.readings, *self.posed(state))
+            return reading_residual(self.mechanism, self.readings, *self.posed(state))
         model = self.mechanism.measured(*self.posed(state)) if state.effects else self.model_positions(state.deviations)
         return self._measured - model
 
     def by_other(self, robot: Robot, poses: Poses, twists: FloatArray) -> FloatArray:
         """Readings minus another robot at Poses (N) under twists (N or 1, sites, 6), of the used points (m, 3)."""
         if self.readings is not None:
-            return self.of_rows(lacking(robot, self.readings, poses, twists))
+            return self.of_rows(reading_residual(robot, self.readings, poses, twists))
         return self.of_rows(self._measured - robot.measured(poses, twists))
 
     def residual(self, state: ModelState) -> FloatArray:

@@ -47,7 +47,7 @@ def zero_notes(estimate: Estimate, robot: Robot) -> Iterator[str]:
     place of a target, has a combined offset with that where its drive slides. A zero whose variance comes from the
     priors is not determined.
     """
-    block, names = estimate.parameters.places[GEOMETRY], robot.parameters.names
+    block, names = estimate.parameters.slices[GEOMETRY], robot.parameters.names
     known = dict(zip(names, range(block.start, block.stop), strict=True))
     for drive in robot.parts.drives:
         name = f"d{drive.column.rpartition('_')[0]}"
@@ -142,7 +142,7 @@ def _nuisance_at_bound(inference: InferenceResult) -> Iterator[tuple[str, str, f
     estimate, weight = inference.fit.estimate, inference.fit.weight
     if not weight or inference.problem.massless:
         return
-    block = estimate.parameters.places[WEIGHT]
+    block = estimate.parameters.slices[WEIGHT]
     held, intervals = estimate.at_bound[block], estimate.intervals[block]
     for (name, unit, value, _), bound, interval in zip(weight, held, intervals, strict=True):
         if bound and abs(value) > OPTIONS.min_nuisance_z * np.ptp(interval) / QUANTILE_95:
@@ -161,7 +161,7 @@ def _significant_nuisance(inference: InferenceResult) -> Iterator[tuple[str, str
     if not weight or problem.massless or unexplained:
         # without masses an error of the payload would be the weight of the links
         return
-    block = estimate.parameters.places[WEIGHT]
+    block = estimate.parameters.slices[WEIGHT]
     shares, intervals = estimate.prior_shares[block], estimate.intervals[block]
     several_loads = len(np.unique(np.nan_to_num(problem.motion.payload_kg[problem.used]))) > 1
     for (name, unit, value, error), share, interval in zip(weight, shares, intervals, strict=True):

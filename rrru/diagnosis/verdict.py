@@ -201,7 +201,7 @@ def why_no_answer(inference: InferenceResult, stated_mm: float | None = None) ->
 def _at_bounds(inference: InferenceResult) -> str:
     """Which geometric errors end at bounds, in words; empty where none."""
     estimate, parameters = inference.fit.estimate, inference.problem.mechanism.parameters
-    held = np.flatnonzero(estimate.at_bound[estimate.parameters.places[GEOMETRY]])
+    held = np.flatnonzero(estimate.at_bound[estimate.parameters.slices[GEOMETRY]])
     if not len(held):
         return ""
     values = estimate.block(GEOMETRY)

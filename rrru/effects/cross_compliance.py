@@ -43,7 +43,7 @@ _HIGHEST, _TYPICAL = 1e-6, 1e-8
 def for_robot(robot: Robot) -> Effect | None:
     """The effect model for the turning joints of a trunk that several arms share, None for fewer than two joints."""
     springs = (*robot.parts.drives, *robot.parts.followers)
-    chains = [{joint.name for joint in leg.joints} for leg in robot.legs.legs] if robot.legs.hands else []
+    chains = [{joint.name for joint in leg.joints} for leg in robot.legs.legs] if robot.legs.end_effectors else []
     trunk = [k for k, spring in enumerate(springs) if spring.unit == "rad" and chains]
     trunk = [k for k in trunk if all(springs[k].site in chain for chain in chains)]
     pairs = np.array(list(combinations(trunk, 2))).reshape(-1, 2)

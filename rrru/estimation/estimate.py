@@ -178,11 +178,11 @@ class Estimate:
 
     def block(self, name: str) -> FloatArray:
         """Values (k,) of a block of parameters; raises KeyError for an unknown name."""
-        return self.values[self.parameters.places[name]]
+        return self.values[self.parameters.slices[name]]
 
     def block_errors(self, name: str) -> FloatArray:
         """Standard errors (k,) of a block of parameters; raises KeyError for an unknown name."""
-        return self.standard_errors[self.parameters.places[name]]
+        return self.standard_errors[self.parameters.slices[name]]
 
     def scaled(self, factor: float) -> Self:
         """The Estimate under a noise that is larger by a factor, for readings that weigh far more than the prior."""

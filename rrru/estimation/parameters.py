@@ -73,8 +73,8 @@ class Parameters:
         return sum(map(len, self.blocks))
 
     @cached_property
-    def places(self) -> dict[str, slice]:
-        """Places of each block in the vector, by the block's name."""
+    def slices(self) -> dict[str, slice]:
+        """Slice of each block in the vector, by the block's name."""
         ends = np.cumsum([0, *map(len, self.blocks)]).tolist()
         return {block.name: slice(*ends[k : k + 2]) for k, block in enumerate(self.blocks)}
 

@@ -26,7 +26,7 @@ from rrru.estimation.solver import solve
 from rrru.kinematics.base_parameters import open_numbers
 from rrru.kinematics.chain import Poses
 from rrru.kinematics.legs import TOOL, WORLD
-from rrru.kinematics.readings import Readings, lacking, place_on_platform
+from rrru.kinematics.readings import Readings, place_on_platform, reading_residual
 from rrru.kinematics.robot import Robot
 
 # a median residual above this share of the robot's size is not due to errors of its geometry
@@ -47,8 +47,8 @@ def register_poses(
 ) -> TargetRegistration:
     """The TargetRegistration of Readings at Poses under twists (1, sites, 6) of a robot.
 
-    Places of the robot's `reads.fitted` are unknown, the others are where the twists have them; mirrored: of an
-    instrument with a left-handed frame. Raises FitError for fewer than three readings at known poses.
+    Places of the robot's `measurement_config.fitted` are unknown, the others are where the twists have them; mirrored:
+    of an instrument with a left-handed frame. Raises FitError for fewer than three readings at known poses.
     """
     _, number, place = _targets(robot, twists, readings)
     centre, turn = poses.position_mm, poses.turn
@@ -84,7 +84,7 @@ def _targets(robot: Robot, twists: FloatArray, readings: Readings) -> tuple[list
     if readings.reflectors is None:
         return [""], np.zeros(count, dtype=int), np.array(place[:1])
     names, first, number = np.unique(readings.reflectors.astype(str), return_index=True, return_inverse=True)
-    unknown = np.isin(names, robot.reads.fitted)
+    unknown = np.isin(names, robot.measurement_config.fitted)
     return names.tolist(), number, np.where(unknown[:, None], np.nan, place[first])
 
 
@@ -97,37 +97,37 @@ def frame_values(robot: Robot, poses: Poses, twists: FloatArray, readings: Readi
     found, numbers = register_poses(robot, poses, twists, readings), robot.legs.site_numbers
     moved = np.array(twists[:1], dtype=float)
     moved[0, numbers[WORLD]] = found.frame
-    if {TOOL} & {site for one in open_numbers(robot.reads) for site in one.twists}:
+    if {TOOL} & {site for one in open_numbers(robot.measurement_config) for site in one.twists}:
         moved[0, numbers[TOOL], 3:] = Rotation.from_matrix(found.tool_turn).as_rotvec()
-    for name in robot.reads.fitted:
+    for name in robot.measurement_config.fitted:
         moved[0, numbers[name], :3] = 0.0
-    if robot.reads.fitted:
+    if robot.measurement_config.fitted:
         names, number, _ = _targets(robot, moved, readings)
         nominal = place_on_platform(robot, moved, readings)
-        for name in robot.reads.fitted:
+        for name in robot.measurement_config.fitted:
             k = names.index(name)
             moved[0, numbers[name], :3] = found.place_mm[k] - nominal[int(np.argmax(number == k))]
     change = moved[0] - twists[0]
     return {
         candidate.name: float(sum(twist @ change[numbers[site]] for site, twist in candidate.twists.items()))
-        for candidate in open_numbers(robot.reads)
+        for candidate in open_numbers(robot.measurement_config)
     }
 
 
 def register_measurements(measurements: pd.DataFrame, robot: Robot) -> pd.DataFrame:
     """A measurement table in the frame of a nominal robot, unchanged where it is near or where that frame is known.
 
-    Where the robot's `reads` leave the frame open and its prediction is far off, measured positions and orientations
-    are turned and shifted into the robot's frame, and unknown places of targets are replaced by those found. Raises
-    FitError where they fit in a left-handed frame alone.
+    Where the robot's `measurement_config` leaves the frame open and its prediction is far off, measured positions and
+    orientations are turned and shifted into the robot's frame, and unknown places of targets are replaced by those
+    found. Raises FitError where they fit in a left-handed frame alone.
     """
-    used, reads = rows.usable(measurements), robot.reads
-    if not reads.frame or used.sum() < _MIN_READINGS:
+    used, config = rows.usable(measurements), robot.measurement_config
+    if not config.frame or used.sum() < _MIN_READINGS:
         return measurements
     actuators, command = rows.actuators(measurements, robot), rows.command(measurements)
     poses, twists = robot.solve(actuators, command), robot.twists()
     readings = rows.readings(measurements, robot.characteristic_length_mm) or Readings(rows.measured(measurements))
-    off = np.linalg.norm(lacking(robot, replace(readings, turn=None), poses, twists)[used], axis=1)
+    off = np.linalg.norm(reading_residual(robot, replace(readings, turn=None), poses, twists)[used], axis=1)
     off = off[np.isfinite(off)]
     if not len(off) or np.median(off) <= LOST_SHARE_OF_SIZE * robot.size_mm:
         return measurements
@@ -155,7 +155,7 @@ def _moved(measurements: pd.DataFrame, robot: Robot, readings: Readings, found: 
         table = table.assign(**rows.turn_columns("measured", turns))
     if readings.reflectors is not None:
         names, number, _ = _targets(robot, robot.twists(), readings)
-        free = np.isin(np.array(names)[number], robot.reads.fitted)
+        free = np.isin(np.array(names)[number], robot.measurement_config.fitted)
         place = np.where(free[:, None], found.place_mm[number], rows.vectors(measurements, "target"))
         table = table.assign(**rows.vector_columns("target", place))
     return table

@@ -17,7 +17,7 @@ import mujoco
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from rrru.formats.joint_graph import Move, Seam, placed, undone
+from rrru.formats.joint_graph import Move, Seam, inverse_placement, placed
 from rrru.formats.mjcf_reader import Assembly, ends_of
 from rrru.formats.structure import Structure
 from rrru.kinematics.base_parameters import Candidate
@@ -154,15 +154,15 @@ def _between(
                 site = structure.chains.sites[item.name] if isinstance(item, Move) else None
                 if site is not None and site in by_site:
                     seat = structure.chains.seats[site]
-                    acts = seat @ by_site[site] @ undone(seat)
-                    at[k if forward else k + 1] = (acts if forward else undone(acts)), site
+                    acts = seat @ by_site[site] @ inverse_placement(seat)
+                    at[k if forward else k + 1] = (acts if forward else inverse_placement(acts)), site
             part = seam.other(part)
         first, last, end = path[0], path[-1], by_site.get(leg.joints[-1].name, np.eye(4))
         _at_end(result, assembly.seams[first], first, assembly.base, base)
         if _hangs_on(assembly, last):
             tip = end
         elif np.allclose(ends.setdefault(last, end), end, rtol=0.0, atol=1e-12):
-            _at_end(result, assembly.seams[last], last, assembly.platform, undone(end))
+            _at_end(result, assembly.seams[last], last, assembly.platform, inverse_placement(end))
         else:
             lost.append(f"{leg.joints[-1].name}: legs that meet before the platform end at one place")
     return result, tip
@@ -173,7 +173,7 @@ def _at_end(result: dict[int, _ActsAt], seam: Seam, number: int, part: int, plac
     if part == seam.near:
         result[number][0] = placement, ""
     else:
-        result[number][len(seam.items)] = undone(placement), ""
+        result[number][len(seam.items)] = inverse_placement(placement), ""
 
 
 def _hangs_on(assembly: Assembly, last: int) -> bool:
@@ -206,9 +206,9 @@ def _of_body(assembly: Assembly, seam: Seam, between: _ActsAt, lost: list[str]) 
     joints = [(k, item.joint) for k, item in enumerate(items) if isinstance(item, Move) and item.joint is not None]
     # the value of a ball joint at home is a turn behind its axes
     balls = {k + 1 for k, joint in joints if model.jnt_type[joint] == _BALL and not isinstance(items[k + 1], Move)}
-    here, places = np.eye(4), [undone(seam.placement(0))]
+    here, places = np.eye(4), [inverse_placement(seam.placement(0))]
     for k, item in enumerate(items[1:], 1):
-        places.append(here @ undone(seam.placement(k)) if k in balls else here)
+        places.append(here @ inverse_placement(seam.placement(k)) if k in balls else here)
         here = here if isinstance(item, Move) or k in balls else here @ item
     places.append(here)
     for k, (placement, site) in sorted(between.items()):
@@ -217,7 +217,7 @@ def _of_body(assembly: Assembly, seam: Seam, between: _ActsAt, lost: list[str]) 
             _lose(lost, site, placement)
             continue
         slot = before[-1] - first + 1 if before else 0
-        acts = places[k] @ placement @ undone(places[k])
+        acts = places[k] @ placement @ inverse_placement(places[k])
         result[slot] = acts @ result[slot] if k == 0 else result[slot] @ acts
     return tuple(result)
 
@@ -235,14 +235,14 @@ def _anchors(assembly: Assembly, seam: Seam, between: _ActsAt, lost: list[str]) 
             _lose(lost, between[k][1], between[k][0])
     far = far @ between.get(len(seam.items), _STAYS)[0]
     moved = {
-        seam.near: near @ undone(seam.placement(0)),
-        seam.far: undone(far) @ seam.placement(moves[-1] + 1) @ seam.placement(-1),
+        seam.near: near @ inverse_placement(seam.placement(0)),
+        seam.far: inverse_placement(far) @ seam.placement(moves[-1] + 1) @ seam.placement(-1),
     }
     result = {}
     for number in seam.connects:
         first, at_first, second, at_second = ends_of(assembly.model, number)
         result[number] = tuple(
-            (undone(there) @ moved[part] @ there @ at)[:3, 3]
+            (inverse_placement(there) @ moved[part] @ there @ at)[:3, 3]
             for (part, there), at in ((assembly.frames[first], at_first), (assembly.frames[second], at_second))
         )
     return result

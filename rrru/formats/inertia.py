@@ -13,7 +13,7 @@ import mujoco
 import numpy as np
 
 from rrru.formats.chains import Chains, Place
-from rrru.formats.joint_graph import placed, turn_of, undone
+from rrru.formats.joint_graph import inverse_placement, placed, turn_of
 from rrru.formats.mjcf_reader import MM
 from rrru.formats.urdf_reader import NO_MASS_KG
 from rrru.kinematics.chain import Twists, Walk, walk
@@ -38,7 +38,7 @@ def point_masses_of(chains: Chains, open_legs: Legs, legs: Legs) -> tuple[PointM
         if mass <= 2.0 * NO_MASS_KG or holder is None:
             continue
         part, there = assembly.frames[holder]
-        home = undone(assembly.home_of(holder)) @ assembly.home_of(body)
+        home = inverse_placement(assembly.home_of(holder)) @ assembly.home_of(body)
         at = _moved(there @ home, points_of(assembly.model, body))
         if part == assembly.frames[assembly.platform][0]:
             result += [PointMass(PLATFORM, mass / 6.0, point) for point in at]

@@ -59,7 +59,7 @@ class Seam:
         if part == self.near:
             return self.items
         return tuple(
-            undone(item) if isinstance(item, np.ndarray) else replace(item, axis=-item.axis)
+            inverse_placement(item) if isinstance(item, np.ndarray) else replace(item, axis=-item.axis)
             for item in reversed(self.items)
         )
 
@@ -73,7 +73,7 @@ def placed(shift_mm: npt.ArrayLike = (0.0, 0.0, 0.0), turn: np.ndarray | None = 
     return result
 
 
-def undone(placement: np.ndarray) -> np.ndarray:
+def inverse_placement(placement: np.ndarray) -> np.ndarray:
     """The inverse of a placement."""
     turn = placement[:3, :3].T
     return placed(-turn @ placement[:3, 3], turn)

@@ -14,7 +14,7 @@ import mujoco
 import numpy as np
 
 from rrru.errors import ConfigError
-from rrru.formats.joint_graph import Item, Move, Seam, placed, turn_of, undone
+from rrru.formats.joint_graph import Item, Move, Seam, inverse_placement, placed, turn_of
 from rrru.kinematics.legs import X, Y, Z
 
 MM = 1000.0
@@ -120,10 +120,10 @@ class Assembly:
         fixed = [(int(self.model.body_parentid[b]), b, self.own(b)) for b in near if b and self._jointless(b)]
         for k in welds:
             first, at_first, second, at_second = ends_of(self.model, k)
-            fixed.append((first, second, at_first @ undone(at_second)))
+            fixed.append((first, second, at_first @ inverse_placement(at_second)))
         for first, second, placement in fixed:
             near[first].append((second, placement))
-            near[second].append((first, undone(placement)))
+            near[second].append((first, inverse_placement(placement)))
         result = {}
         for part in (self.base, self.platform, *near):
             todo = [] if part in result else [(part, np.eye(4))]
@@ -149,7 +149,7 @@ class Assembly:
             for joint in range(first, first + count):
                 items += self._joint_items(joint) if joint not in self._backlash_joints else []
             if near != far:
-                result.append(Seam(near, far, (*items, undone(after)), body))
+                result.append(Seam(near, far, (*items, inverse_placement(after)), body))
         return result
 
     def _joint_items(self, joint: int) -> list[Item]:
@@ -181,7 +181,7 @@ class Assembly:
 
     def _connect_items(self, near: int, far: int, group: Sequence[tuple[int, np.ndarray, np.ndarray]]) -> list[Item]:
         """Placements and Moves of all connects (number, point of near, point of far) of two parts."""
-        turn = (undone(self.home_of(near)) @ self.home_of(far))[:3, :3]
+        turn = (inverse_placement(self.home_of(near)) @ self.home_of(far))[:3, :3]
         (first, near_mm, far_mm), *further = group
         name = self.eq_name(first)
         if not further:

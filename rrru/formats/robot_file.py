@@ -16,7 +16,7 @@ import numpy as np
 
 from rrru.errors import ConfigError, not_a_file, why_unreadable
 from rrru.formats import urdf_reader as urdf_files
-from rrru.formats.couplings import Follows, of_equalities, of_mimics
+from rrru.formats.couplings import JointCoupling, couplings_of_equalities, couplings_of_mimics
 from rrru.formats.inertia import point_masses_of
 from rrru.formats.joint_graph import Move
 from rrru.formats.mjcf_reader import MM, Assembly
@@ -83,8 +83,8 @@ def with_tip(section: dict[str, Any]) -> dict[str, Any]:
 
 def urdf_parts(
     path: str | Path, base: str | None = None, tip: str | None = None, home: Mapping[str, float] | None = None
-) -> tuple[Assembly, dict[int, list[np.ndarray]], dict[int, Follows]]:
-    """The Assembly of a URDF's chain, its driven joints as `structure_of` wants them, and what follows them."""
+) -> tuple[Assembly, dict[int, list[np.ndarray]], dict[int, JointCoupling]]:
+    """The Assembly of a URDF's chain, its driven joints as `structure_of` wants them, and the couplings to them."""
     file = _existing(path)
     urdf = urdf_files.read(file)
     model, known = urdf.model, {urdf.model.joint(j).name: j for j in range(urdf.model.njnt)}
@@ -106,11 +106,11 @@ def urdf_parts(
         link = model.body(model.jnt_bodyid[move.joint]).name
         if link in urdf.odd:
             raise assembly.error(urdf.odd[link])
-    follows = of_mimics(assembly, urdf.mimics)
+    couplings = couplings_of_mimics(assembly, urdf.mimics)
     driven = (move.joint for move in assembly.moves.values() if move.joint is not None)
-    servos: dict[int, list[np.ndarray]] = {joint: [] for joint in driven if joint not in follows}
+    servos: dict[int, list[np.ndarray]] = {joint: [] for joint in driven if joint not in couplings}
     assembly.limits = {known[name]: limits for name, limits in urdf.limits.items() if name in known}
-    return assembly, servos, follows
+    return assembly, servos, couplings
 
 
 def from_mjcf(path: str | Path, platform: str, **options: Any) -> GeneralRobot:
@@ -124,8 +124,10 @@ def from_mjcf(path: str | Path, platform: str, **options: Any) -> GeneralRobot:
     return _robot(*mjcf_parts(path, platform), options)
 
 
-def mjcf_parts(path: str | Path, platform: str) -> tuple[Assembly, dict[int, list[np.ndarray]], dict[int, Follows]]:
-    """The Assembly of an MJCF, its driven joints as `structure_of` wants them, and what follows them."""
+def mjcf_parts(
+    path: str | Path, platform: str
+) -> tuple[Assembly, dict[int, list[np.ndarray]], dict[int, JointCoupling]]:
+    """The Assembly of an MJCF, its driven joints as `structure_of` wants them, and the couplings to them."""
     file = _existing(path)
     try:
         spec = mujoco.MjSpec.from_file(str(file))
@@ -140,7 +142,7 @@ def mjcf_parts(path: str | Path, platform: str) -> tuple[Assembly, dict[int, lis
     assembly = _assembly(model, file, 0, model.body(platform).id, home)
     servos = _servos(assembly)
     assembly.limits = {joint: (_effort(model, joint), np.nan) for joint in servos}
-    return assembly, servos, of_equalities(assembly, servos)
+    return assembly, servos, couplings_of_equalities(assembly, servos)
 
 
 def _existing(path: str | Path) -> Path:
@@ -216,15 +218,15 @@ def _moved_by(model: mujoco.MjModel, k: int) -> set[int] | None:
 def _robot(
     assembly: Assembly,
     servos: Mapping[int, Sequence[np.ndarray]],
-    follows: Mapping[int, Follows],
+    couplings: Mapping[int, JointCoupling],
     options: dict[str, Any],
 ) -> GeneralRobot:
-    """The GeneralRobot of an Assembly's legs, servos the driven joints as `_servos` gives them, follows by joint."""
+    """The GeneralRobot of an Assembly's legs, servos the driven joints as `_servos` gives them, couplings by joint."""
     read = {"legs", "parts", "point_masses", "effort_limits", "velocity_limits"}
     known = {one.name for one in fields(GeneralRobot) if one.init} - read
     if unknown := set(options) - known:
         raise assembly.error(f"unknown key {unknown.pop()!r}; allowed: {', '.join(sorted(known))}")
-    structure = structure_of(assembly, servos, follows, options.get("up"))
+    structure = structure_of(assembly, servos, couplings, options.get("up"))
     chains, legs, moves = structure.chains, structure.legs, structure.driven
     ends = [np.linalg.norm(leg.bar.platform_mm) for leg in legs.legs if leg.bar]
     arm = float(np.mean(ends)) if ends else 0.0

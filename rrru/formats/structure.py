@@ -1,4 +1,6 @@
-"""The legs of an Assembly, closed at home, and their origin in the file, for `rrru.formats.robot_file` and the writers.
+"""The legs of an Assembly, closed at home, and which of the file's joints they come from.
+
+`rrru.formats.robot_file` makes a robot of them, the writers find the file's places to change by them.
 
 Lengths in mm, angles in rad.
 """
@@ -10,8 +12,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from rrru.formats.chains import Chains, Cut, with_bars
-from rrru.formats.couplings import Follows, coupling
-from rrru.formats.joint_graph import Move, undone
+from rrru.formats.couplings import JointCoupling, coupling_matrix
+from rrru.formats.joint_graph import Move, inverse_placement
 from rrru.formats.mjcf_reader import Assembly
 from rrru.kinematics.chain import PoseGuess, Twists, bar_pose, walk
 from rrru.kinematics.closure import Closure
@@ -19,18 +21,23 @@ from rrru.kinematics.closure_kernel import CHARACTERISTIC_LENGTH_MM
 from rrru.kinematics.legs import Legs
 from rrru.kinematics.mobility import free_motions
 
-# a loop may be open by the first length at the file's home pose, whose numbers are often rounded, and by the second
-# after it is closed, where redundant joints do not fit each other; below the third it counts as closed already
-_OPEN_MM, _LEFT_MM, _CLOSED_MM = 1.0, 0.01, 1e-9
+# closure error that a loop may have at the file's home pose, whose numbers are often rounded; assumed
+_MAX_OPEN_MM = 1.0
+# closure error that may remain after closing it, where redundant joints do not fit each other; assumed
+_MAX_REMAINING_MM = 0.01
+# closure error below which it is closed already: rounding
+_CLOSED_MM = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
 class Structure:
     """The legs of an Assembly.
 
-    chains: Chains of its joints; open_legs: Legs of these alone; cuts: by number of leg the Cut of one that ends in a
-    bar; legs: with bars, closed at home; servos: by driven joint the ranges that its servos allow; follows: by joint;
-    up (3,): away from the ground.
+    chains: Chains of its joints; open_legs: Legs of these alone.
+    cuts: by number of the leg the Cut of a leg that ends in a bar; legs: with these bars, closed at home.
+    servos: by driven joint ranges (low, high) of qpos, in m or rad, that its servos allow.
+    couplings: JointCoupling by following joint.
+    up (3,): unit vector away from the ground.
     """
 
     assembly: Assembly
@@ -39,13 +46,13 @@ class Structure:
     cuts: dict[int, Cut]
     legs: Legs
     servos: Mapping[int, Sequence[np.ndarray]]
-    follows: Mapping[int, Follows]
+    couplings: Mapping[int, JointCoupling]
     up: tuple[float, float, float]
 
     @property
     def joints(self) -> tuple[int, ...]:
         """MuJoCo's numbers of the driven joints, in the order of the drives, and after them of their followers."""
-        return (*self.servos, *self.follows)
+        return (*self.servos, *self.couplings)
 
     @property
     def driven(self) -> list[Move]:
@@ -57,39 +64,39 @@ class Structure:
 def structure_of(
     assembly: Assembly,
     servos: Mapping[int, Sequence[np.ndarray]],
-    follows: Mapping[int, Follows],
+    couplings: Mapping[int, JointCoupling],
     up: tuple[float, float, float] | None = None,
 ) -> Structure:
     """The Structure of an Assembly.
 
-    servos: by driven joint ranges (low, high) of qpos that its servos allow; follows: Follows by joint; up (3,): by
-    default against the file's gravity. Raises ConfigError where the legs do not hold the platform or do not close.
+    servos, couplings, up: as of the Structure, up by default against the file's gravity. Raises ConfigError where the
+    legs do not hold the platform or do not close.
     """
     if not assembly.paths:
         raise assembly.error(f"no joints lead from the base to {assembly.body_name(assembly.platform)}; allowed: a leg")
     if not servos:
         raise assembly.error("no actuator drives a joint of the legs; allowed: one or more")
-    offsets: dict[int | None, float] = {joint: one.offset for joint, one in follows.items()}
-    chains, home = Chains(assembly, [*servos, *follows], offsets), undone(assembly.home_of(assembly.base))
+    offsets: dict[int | None, float] = {joint: one.offset for joint, one in couplings.items()}
+    chains, home = Chains(assembly, [*servos, *couplings], offsets), inverse_placement(assembly.home_of(assembly.base))
     pose = home @ assembly.home_of(assembly.platform)
     values = np.array([next(m.home for m in assembly.moves.values() if m.joint == joint) for joint in servos])
-    open_legs = Legs(chains.legs, values, pose[:3, 3], pose[:3, :3], coupling=coupling(servos, follows))
+    open_legs = Legs(chains.legs, values, pose[:3, 3], pose[:3, :3], coupling=coupling_matrix(servos, couplings))
     gravity = home[:3, :3] @ assembly.model.opt.gravity
     if up is None:
         up = tuple(-gravity / np.linalg.norm(gravity)) if gravity.any() else (0.0, 0.0, 1.0)
     with_bar, cuts = with_bars(open_legs)
     legs = _closed(assembly, replace(open_legs, legs=with_bar), up)
-    return Structure(assembly, chains, open_legs, cuts, legs, servos, follows, up)
+    return Structure(assembly, chains, open_legs, cuts, legs, servos, couplings, up)
 
 
 def _closed(assembly: Assembly, legs: Legs, up: tuple[float, float, float]) -> Legs:
     """Legs whose home pose closes all loops next to the file's; raises ConfigError where it cannot."""
     start = PoseGuess(legs.home_mm[None], legs.home_turn[None], legs.home_passive[None])
     gaps = _gaps(legs, start)
-    if gaps.max() > _OPEN_MM:
+    if gaps.max() > _MAX_OPEN_MM:
         joints = ", ".join(assembly.names_along(assembly.paths[gaps.argmax()]))
         text = f"the leg through {joints} misses the platform by {gaps.max():.3f} mm at the home pose"
-        raise assembly.error(f"{text}; allowed: up to {_OPEN_MM:g} mm; a keyframe may set it")
+        raise assembly.error(f"{text}; allowed: up to {_MAX_OPEN_MM:g} mm; a keyframe may set it")
     if free := free_motions(legs, up):
         text = f"body {assembly.body_name(assembly.platform)} is free to {'; '.join(free)} at the home pose"
         raise assembly.error(f"{text}; allowed: legs that hold it with locked drives")
@@ -97,8 +104,8 @@ def _closed(assembly: Assembly, legs: Legs, up: tuple[float, float, float]) -> L
         return legs
     poses = Closure(legs).solve(legs.home_drives[None], start)
     left = _gaps(legs, poses).max() if poses.closed.all() else gaps.max()
-    if left > _LEFT_MM:
-        raise assembly.error(f"the loops stay open by {left:.3f} mm; allowed: up to {_LEFT_MM:g} mm")
+    if left > _MAX_REMAINING_MM:
+        raise assembly.error(f"the loops stay open by {left:.3f} mm; allowed: up to {_MAX_REMAINING_MM:g} mm")
     homes = dict(zip((joint.name for joint in legs.passive_joints), poses.passive[0], strict=True))
     chains = tuple(
         replace(leg, joints=tuple(replace(j, home=homes[j.name]) if j.passive else j for j in leg.joints))
@@ -108,7 +115,10 @@ def _closed(assembly: Assembly, legs: Legs, up: tuple[float, float, float]) -> L
 
 
 def _gaps(legs: Legs, poses: PoseGuess) -> np.ndarray:
-    """Closure error (legs,) in mm of every leg at one pose with drives at home, angles counted in the arm."""
+    """Closure error (legs,) in mm of every leg at one pose with drives at home.
+
+    Of an end without a bar: its distance, and its angle in rad times CHARACTERISTIC_LENGTH_MM.
+    """
     result, actuators, twists = [], legs.home_drives[None], Twists(legs)
     for leg in legs.legs:
         way = walk(legs, leg, actuators, poses.passive, twists)

@@ -14,10 +14,10 @@ from rrru.arrays import BoolArray, FloatArray
 from rrru.kinematics.base_parameters import (
     Candidate,
     MeasurementConfig,
+    candidate_components,
     choose,
     column_scale,
     direction,
-    offered,
     open_numbers,
 )
 from rrru.kinematics.legs import Legs
@@ -35,18 +35,18 @@ class AugmentedRobot(Robot):
     """A robot and its campaign's MeasurementConfig; added: Candidates that join its parameters, None for all."""
 
     robot: Robot
-    reads: MeasurementConfig
+    measurement_config: MeasurementConfig
     added: tuple[Candidate, ...] | None = None
 
     @cached_property
     def legs(self) -> Legs:
         """The robot's legs, with the reflectors as sites."""
-        return replace(self.robot.legs, reflectors=self.reads.reflectors)
+        return replace(self.robot.legs, reflectors=self.measurement_config.reflectors)
 
     @property
     def _added(self) -> tuple[Candidate, ...]:
         """The Candidates in addition to the robot's own parameters."""
-        return open_numbers(self.reads) if self.added is None else self.added
+        return open_numbers(self.measurement_config) if self.added is None else self.added
 
     @cached_property
     def parameters(self) -> ParameterSet:
@@ -63,11 +63,11 @@ class AugmentedRobot(Robot):
         return np.concatenate([robots, *(direction(self.legs, added)[:, :, None] for added in self._added)], axis=2)
 
     @property
-    def offered(self) -> BoolArray:
+    def candidate_components(self) -> BoolArray:
         """Which components (sites, 6) of constant twists its readings leave open."""
-        return offered(self.legs, open_numbers(self.reads))
+        return candidate_components(self.legs, open_numbers(self.measurement_config))
 
-    def seen_at(
+    def with_identifiable_parameters(
         self, actuators: FloatArray, position_mm: FloatArray, readings: Readings | None = None
     ) -> "AugmentedRobot":
         """The robot with the added parameters that are identifiable at poses (n, K), (n, 3) with Readings."""
@@ -80,9 +80,9 @@ class AugmentedRobot(Robot):
         chosen, _ = choose(columns[:, count:] * scale, [True] * len(scale), _LEFT_OF_DATA, basis)
         return replace(self, added=tuple(self._added[k] for k in chosen))
 
-    def reading(self, reads: MeasurementConfig) -> Robot:
+    def with_measurement_config(self, config: MeasurementConfig) -> Robot:
         """The robot with another MeasurementConfig."""
-        return self.robot.reading(reads)
+        return self.robot.with_measurement_config(config)
 
     def inverse(self, position_mm: FloatArray, deviations: FloatArray | None = None, elbow: str = "out") -> FloatArray:
         """Actuator values (n, K) for positions (n, 3) in the robot's own frame by its own parameters; see Robot."""
@@ -122,7 +122,16 @@ def _own(name: str) -> property:
 for _name in (
     *("name", "parts", "characteristic_length_mm", "up", "up_stated", "tool_mm", "orients", "workspace_lines", "seats"),
     "point_masses",
-    *("reach_mm", "size_mm", "farthest_mm", "freedoms", "strokes", "drive_range", "effort_limits", "velocity_limits"),
+    *(
+        "reach_mm",
+        "size_mm",
+        "farthest_mm",
+        "degrees_of_freedom",
+        "strokes",
+        "drive_range",
+        "effort_limits",
+        "velocity_limits",
+    ),
     *("TRACKED", "RICHEST", "SEARCHED", "in_range", "unreached", "guess", "passive_near", "gauge"),
     *("confounded_outside", "own_load", "own_member_forces", "own_moments", "own_base_moment"),
 ):

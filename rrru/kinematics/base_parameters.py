@@ -39,20 +39,20 @@ class MeasurementConfig:
     frame: bool = False
 
 
-def open_numbers(reads: MeasurementConfig) -> tuple[Candidate, ...]:
+def open_numbers(config: MeasurementConfig) -> tuple[Candidate, ...]:
     """Candidates of a MeasurementConfig: places of reflectors, the tool's pose with orientations, the frame."""
-    first = 3 if reads.fitted else 0
-    tool = range(first, 6) if reads.turned and reads.frame else ()
-    places = [(name, k) for name in reads.fitted for k in range(3)] + [(TOOL, k) for k in tool]
-    return tuple(_at(*place) for place in places + [(WORLD, k) for k in range(6) if reads.frame])
+    first = 3 if config.fitted else 0
+    tool = range(first, 6) if config.turned and config.frame else ()
+    places = [(name, k) for name in config.fitted for k in range(3)] + [(TOOL, k) for k in tool]
+    return tuple(_at(*place) for place in places + [(WORLD, k) for k in range(6) if config.frame])
 
 
-def candidates_of(legs: Legs, parts: Parts, reads: MeasurementConfig | None = None) -> tuple[Candidate, ...]:
+def candidates_of(legs: Legs, parts: Parts, config: MeasurementConfig | None = None) -> tuple[Candidate, ...]:
     """All Candidates of Legs, drives first, then lengths along links, other shifts, angles, tool and world.
 
     Those of the MeasurementConfig come before the others of tool and world.
     """
-    reads = reads or MeasurementConfig()
+    config = config or MeasurementConfig()
     drives = [
         Candidate(f"d{drive.column.rpartition('_')[0]}", drive.unit, number, drive.twists)
         for number, drive in enumerate(parts.drives, 1)
@@ -74,10 +74,10 @@ def candidates_of(legs: Legs, parts: Parts, reads: MeasurementConfig | None = No
             lengths.append((bar, 0))
             shifts += [(end, k) for k in range(3)]
     # with several end effectors the last frame of each is its tool
-    tool = () if legs.hands else range(6 if reads.turned or reads.reflectors else 3)
+    tool = () if legs.end_effectors else range(6 if config.turned or config.reflectors else 3)
     outside = [(TOOL, k) for k in tool] + [(WORLD, k) for k in range(6)]
     numbers = [_at(*place) for place in (*lengths, *shifts, *turns) if place not in taken]
-    every = [*drives, *numbers, *open_numbers(reads), *(_at(*place) for place in outside)]
+    every = [*drives, *numbers, *open_numbers(config), *(_at(*place) for place in outside)]
     return tuple({candidate.name: candidate for candidate in every}.values())
 
 
@@ -112,7 +112,7 @@ def direction(legs: Legs, candidate: Candidate) -> FloatArray:
     return result
 
 
-def offered(legs: Legs, candidates: Sequence[Candidate]) -> BoolArray:
+def candidate_components(legs: Legs, candidates: Sequence[Candidate]) -> BoolArray:
     """Which components (sites, 6) of twists Candidates represent."""
     return np.asarray(np.any([direction(legs, one).astype(bool) for one in candidates], axis=0))
 

@@ -97,8 +97,8 @@ class MultiArmRobot(GeneralRobot):
 
         Raises ConfigError for a target that no end effector carries.
         """
-        owner = {target: number for number, carried in enumerate(self.legs.hands) for target in carried}
-        wanted = [self.legs.hands[0][0]] * len(actuators) if targets is None else list(targets)
+        owner = {target: number for number, carried in enumerate(self.legs.end_effectors) for target in carried}
+        wanted = [self.legs.end_effectors[0][0]] * len(actuators) if targets is None else list(targets)
         if unknown := [target for target in wanted if target not in owner]:
             allowed = ", ".join(owner)
             text = f"no end effector carries the target {unknown[0]!r}; allowed: {allowed}"
@@ -113,7 +113,7 @@ class MultiArmRobot(GeneralRobot):
     def _workspace(self) -> tuple[FloatArray, FloatArray]:
         """Actuator values (n, K) spread over the drives' ranges and positions (n, 3) of the end effectors in turn."""
         actuators, _ = super()._workspace()
-        first_targets = cycle(target for target, *_ in self.legs.hands)
+        first_targets = cycle(target for target, *_ in self.legs.end_effectors)
         return actuators, self.guess(actuators, list(islice(first_targets, len(actuators))))
 
 
@@ -141,7 +141,7 @@ def with_hands(
     coupling = _coupling(arms.values(), order, list(drives))
     options = {option.name: getattr(first, option.name) for option in fields(first)}
     joined = {
-        "legs": Legs(chains, home, first.legs.home_mm, first.legs.home_turn, coupling=coupling, hands=targets),
+        "legs": Legs(chains, home, first.legs.home_mm, first.legs.home_turn, coupling=coupling, end_effectors=targets),
         "parts": Parts(drives=tuple(drives.values()), followers=tuple(followers.values())),
         "drive_range": ranges,
         "assumed": frozenset().union(*(arm.assumed for arm in arms.values())),

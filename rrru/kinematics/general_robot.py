@@ -21,12 +21,12 @@ from rrru.kinematics import base_parameters
 from rrru.kinematics.base_parameters import (
     Candidate,
     MeasurementConfig,
+    candidate_components,
     candidates_of,
     choose,
     column_scale,
     direction,
     in_words,
-    offered,
     open_numbers,
 )
 from rrru.kinematics.chain import PoseGuess, Poses
@@ -51,8 +51,8 @@ class GeneralRobot(Robot):
     drive_range (K, 2): actuator values between which it works; assumed: columns of the drives without a stated range,
     which may go beyond it; parameter_set: one of SETS; point_masses: point masses of its links; sample: actuator values
     (n, K), positions (n, 3) and Readings at which the set is chosen, by default over the workspace; among: names that
-    it is chosen from, by default all; reads: a campaign's MeasurementConfig; effort_limits, velocity_limits: of
-    `Robot`.
+    it is chosen from, by default all; measurement_config: a campaign's MeasurementConfig; effort_limits,
+    velocity_limits: of `Robot`.
     """
 
     name: str
@@ -70,7 +70,7 @@ class GeneralRobot(Robot):
     assumed: frozenset[str] = frozenset()
     sample: tuple[FloatArray, FloatArray, Readings | None] | None = None
     among: tuple[str, ...] = ()
-    reads: MeasurementConfig = field(default_factory=MeasurementConfig)
+    measurement_config: MeasurementConfig = field(default_factory=MeasurementConfig)
     effort_limits: FloatArray | None = None
     velocity_limits: FloatArray | None = None
 
@@ -84,7 +84,7 @@ class GeneralRobot(Robot):
     @cached_property
     def candidates(self) -> tuple[Candidate, ...]:
         """All Candidates, see `rrru.kinematics.base_parameters`."""
-        return candidates_of(self.legs, self.parts, self.reads)
+        return candidates_of(self.legs, self.parts, self.measurement_config)
 
     @cached_property
     def _chosen(self) -> tuple[tuple[Candidate, ...], dict[str, FloatArray]]:
@@ -109,9 +109,9 @@ class GeneralRobot(Robot):
         return tuple(candidates[k] for k in chosen), replaced
 
     @property
-    def offered(self) -> BoolArray:
+    def candidate_components(self) -> BoolArray:
         """Which components (sites, 6) of constant twists its parameters are chosen from."""
-        return offered(self.legs, self._wanted)
+        return candidate_components(self.legs, self._wanted)
 
     @cached_property
     def _wanted(self) -> tuple[Candidate, ...]:
@@ -119,7 +119,7 @@ class GeneralRobot(Robot):
         if self.parameter_set == "full":
             return self.candidates
         drives = self.candidates[: len(self.parts.drives)] if self.parameter_set == "zero" else ()
-        return (*drives, *open_numbers(self.reads))
+        return (*drives, *open_numbers(self.measurement_config))
 
     def _workspace(self) -> tuple[FloatArray, FloatArray]:
         """Actuator values (n, K) spread over the drives' ranges and positions (n, 3) near those of the tool."""
@@ -195,11 +195,13 @@ class GeneralRobot(Robot):
                 result[chosen.name] += share * value
         return result
 
-    def reading(self, reads: MeasurementConfig) -> Self:
+    def with_measurement_config(self, config: MeasurementConfig) -> Self:
         """The robot with a campaign's `rrru.kinematics.base_parameters.MeasurementConfig`."""
-        return replace(self, legs=replace(self.legs, reflectors=reads.reflectors), reads=reads)
+        return replace(self, legs=replace(self.legs, reflectors=config.reflectors), measurement_config=config)
 
-    def seen_at(self, actuators: FloatArray, position_mm: FloatArray, readings: Readings | None = None) -> Self:
+    def with_identifiable_parameters(
+        self, actuators: FloatArray, position_mm: FloatArray, readings: Readings | None = None
+    ) -> Self:
         """The robot with its set reduced to the parameters identifiable at poses of a campaign, (n, K) and (n, 3).
 
         readings: what was read at these poses, by default positions of the tool. A second reduction, at poses of a part
@@ -217,7 +219,7 @@ class GeneralRobot(Robot):
     @property
     def orients(self) -> bool:
         """Whether its drives can orient its platform besides moving it."""
-        return self.freedoms[1] > 0
+        return self.degrees_of_freedom[1] > 0
 
     @property
     def size_mm(self) -> float:
@@ -303,7 +305,7 @@ class GeneralRobot(Robot):
         return None not in bars and len(bars) == len(self.parts.drives) and self.legs.coupling is None
 
     @cached_property
-    def freedoms(self) -> tuple[int, int]:
+    def degrees_of_freedom(self) -> tuple[int, int]:
         """Degrees of freedom of the tool's position, and in addition of the platform's orientation, by the drives."""
         actuators, position = (part[:10] for part in self._workspace())
         at = self.map_of_closed(actuators, position)

@@ -1,4 +1,4 @@
-"""Inverse kinematics of a general robot: Newton continuation, lengths of driven bars. Lengths in mm, angles in rad."""
+"""Inverse kinematics of a general robot by damped Newton steps, and the lengths of driven bars. mm, rad."""
 
 from typing import TYPE_CHECKING
 
@@ -15,67 +15,73 @@ if TYPE_CHECKING:
     from rrru.kinematics.general_robot import GeneralRobot
     from rrru.kinematics.robot import Robot
 
-# positions (n, 3) and orientations (n, 3, 3)
-Place = tuple[FloatArray, FloatArray]
+# positions (n, 3) in mm and orientations (n, 3, 3), robot frame
+PoseArrays = tuple[FloatArray, FloatArray]
 
-# an inverse has at most so many steps. The longest step is a share of a drive's range, or of a turn if that is less:
-# longer ones end in other assemblies or do not converge
-_STEPS, _REACHED_MM, _LONGEST_STEP = 100, 1e-9, 0.05
-# singular values below this share count as lost; where they leave steps below a share of the drives' ranges, it takes
-# a step of another share to get away
-_LOST, _STILL, _AWAY = 1e-9, 1e-6, 0.01
-_FREEDOMS = 6
-# values beyond a drive's range by no more than this share of it are in it
+# Newton steps of one solution, and the remaining error at which it ends
+_MAX_STEPS, _REACHED_MM = 100, 1e-9
+# larger errors than this after the last step are no solution
+_ACCEPTED_MM = 1e3 * _REACHED_MM
+# longest step of a drive, as a share of its range, or of a turn if that is less: longer ones end in other assemblies or
+# do not converge
+_LONGEST_STEP = 0.05
+# singular values below this share of the matrix's norm count as zero: the pose is singular
+_SINGULAR_SHARE = 1e-9
+# where a singular pose leaves steps below the first share of the drives' ranges, all drives move by the second
+_SHORTEST_STEP, _ESCAPE_STEP = 1e-6, 0.01
+# values beyond a drive's range by no more than this share of it are in it: rounding
 _SLACK = 1e-6
-# a pose followed from home counts if it is so much closer than home to where it should be
-_CLOSE = 0.1
+# a pose followed from home is used where its distance from where it should be is below this share of home's distance
+_MAX_DISTANCE_SHARE = 0.1
 
 
-def drives_from_home(robot: "GeneralRobot", place: Place, twists: FloatArray, nearest: bool) -> FloatArray:
+def drives_from_home(robot: "GeneralRobot", goal: PoseArrays, twists: FloatArray, nearest: bool) -> FloatArray:
     """`inverse_kinematics` near the home pose."""
-    count, legs = len(place[0]), robot.legs
-    start = np.tile(legs.home_drives, (count, 1)).astype(float), np.tile(legs.home_mm, (count, 1))
-    return inverse_kinematics(robot, place, start, twists, nearest)
+    count, legs = len(goal[0]), robot.legs
+    start = np.tile(legs.home_drives, (count, 1)), np.tile(legs.home_mm, (count, 1))
+    return inverse_kinematics(robot, goal, start, twists, nearest)
 
 
 def inverse_kinematics(
-    robot: "Robot", place: Place, start: tuple[FloatArray, FloatArray], twists: FloatArray, nearest: bool = True
+    robot: "Robot", goal: PoseArrays, start: tuple[FloatArray, FloatArray], twists: FloatArray, nearest: bool = True
 ) -> FloatArray:
-    """Actuator values (n, K) of a robot at places of its tool, under twists (n or 1, sites, 6); NaN where it has none.
+    """Actuator values (n, K) of a robot at poses of its tool, under twists (n or 1, sites, 6); NaN where it has none.
 
-    place: positions (n, 3) of the tool and orientations (n, 3, 3) of the platform, met where the drives can choose
-    them; start: actuator values (n, K) and positions (n, 3) near which to search; nearest: whether the nearest
+    goal: positions (n, 3) of the tool and orientations (n, 3, 3) of the platform, met where the drives can choose
+    it; start: actuator values (n, K) and positions (n, 3) near which to search; nearest: whether the nearest
     position that the drives can reach is accepted.
     """
-    (position, wanted), (actuators, near) = place, start
+    (position, wanted), (start_actuators, near) = goal, start
+    actuators = np.array(start_actuators, dtype=float)
     poses, left = robot.solve(actuators, near, twists), np.full(len(position), np.inf)
     (low, high), widths = np.asarray(robot.drive_range, dtype=float).T, _widths(robot)
     rows, going = np.arange(len(position)), np.isfinite(actuators).all(axis=1)
-    for _ in range(_STEPS):
+    for _ in range(_MAX_STEPS):
         going = going & poses.closed & ~(left[rows] < _REACHED_MM)
         rows, poses = rows[going], poses.of(going)
         if not len(rows):
             break
         twist = twists[rows] if len(twists) > 1 else twists
         at = robot.map(actuators[rows], poses, twist)
-        lack = position[rows] - robot.measured(at.poses, twist)
-        turning = Rotation.from_matrix(wanted[rows] @ at.poses.turn.transpose(0, 2, 1)).as_rotvec()
-        step, held, lost = drive_step(at, robot.freedoms, lack, turning, widths)
+        error_mm = position[rows] - robot.measured(at.poses, twist)
+        error_rad = Rotation.from_matrix(wanted[rows] @ at.poses.turn.transpose(0, 2, 1)).as_rotvec()
+        step, error_of_turn, singular = drive_step(at, robot.degrees_of_freedom, error_mm, error_rad, widths)
         longest, gain = np.abs(step).max(axis=1), (at.drive_response @ (widths * step)[:, :, None])[:, :, 0]
         # an error that no drive changes stays: a point off the plane of a planar robot
-        off = np.linalg.norm(lack - gain, axis=1)
-        going = nearest | lost | (longest >= _STILL) | (off < 1e3 * _REACHED_MM)
+        off_mm = np.linalg.norm(error_mm - gain, axis=1)
+        going = nearest | singular | (longest >= _SHORTEST_STEP) | (off_mm < _ACCEPTED_MM)
         if nearest:
             # a plane that deviations have tilted does not contain the commanded points: the nearest ones replace them
-            lack = np.where(lost[:, None], lack, gain)
-        left[rows] = np.linalg.norm(lack, axis=1) + robot.characteristic_length_mm * held
+            error_mm = np.where(singular[:, None], error_mm, gain)
+        left[rows] = np.linalg.norm(error_mm, axis=1) + robot.characteristic_length_mm * error_of_turn
         step *= np.minimum(1.0, _LONGEST_STEP / np.maximum(longest, 1e-9))[:, None]
         # a stretched arm gets no step in the direction of its singularity: it is moved away from there
-        still = lost & (longest < _STILL) & (left[rows] >= _REACHED_MM)
-        step[still] = np.where(actuators[rows] - low > high - actuators[rows], -_AWAY, _AWAY)[still]
+        stuck = singular & (longest < _SHORTEST_STEP) & (left[rows] >= _REACHED_MM)
+        away = np.where(actuators[rows] - low > high - actuators[rows], -_ESCAPE_STEP, _ESCAPE_STEP)
+        step[stuck] = away[stuck]
         actuators[rows] += widths * step
         poses = robot.model.solve(actuators[rows], poses, twist)
-    return np.where((left < 1e3 * _REACHED_MM)[:, None], actuators, np.nan)
+    return np.where((left < _ACCEPTED_MM)[:, None], actuators, np.nan)
 
 
 @last_cached
@@ -98,7 +104,7 @@ def near_or_followed(robot: "GeneralRobot", actuators: FloatArray, near: PoseGue
         return near
     poses = followed(robot, actuators)
     off = np.linalg.norm(poses.position_mm - near.position_mm, axis=1)
-    close = off < _CLOSE * np.linalg.norm(robot.legs.home_mm - near.position_mm, axis=1)
+    close = off < _MAX_DISTANCE_SHARE * np.linalg.norm(robot.legs.home_mm - near.position_mm, axis=1)
     return poses.where(close, near)
 
 
@@ -134,26 +140,25 @@ def in_range(robot: "GeneralRobot", actuators: FloatArray) -> FloatArray:
 
 
 def drive_step(
-    at: TwistMap, ranks: tuple[int, int], lack_mm: FloatArray, turning_rad: FloatArray, widths: FloatArray
+    at: TwistMap, ranks: tuple[int, int], error_mm: FloatArray, error_rad: FloatArray, widths: FloatArray
 ) -> tuple[FloatArray, FloatArray, BoolArray]:
-    """Changes (n, K) of the actuator values that remove errors of position (n, 3) and, if possible, of turn (n, 3).
+    """Changes (n, K) of the actuator values that remove errors of position (n, 3) and, if possible, of orientation.
 
-    ranks: degrees of freedom of the point's position and, in addition, of the platform's orientation by the drives;
-    widths (K,): of the drives' ranges, which scale the changes; the smallest scaled changes are returned. Returns also
+    error_rad (n, 3): rotation vectors from the present orientations to the goal's; ranks: degrees of freedom of the point's position and, in addition, of the platform's orientation by the drives; widths (K,): of the drives' ranges, which scale the changes; the smallest scaled changes are returned. Returns also
     the size (n,) in rad of the remaining change of orientation that is possible, and whether (n,) a pose lacks a degree
     of freedom. The orientation is corrected in the null space of the position (Siciliano et al., 2009, section 3.5).
     """
     response, turn = at.drive_response * widths, at.platform[:, 3:] @ at.drive_counts * widths
-    reach, stretched = _inverse_of_rank(response, ranks[0], response)
-    step = reach @ lack_mm[:, :, None]
+    reach, singular = _inverse_of_rank(response, ranks[0], response)
+    step = reach @ error_mm[:, :, None]
     null_space = np.eye(len(widths)) - reach @ response
     inverse, aligned = _inverse_of_rank(turn @ null_space, ranks[1], turn)
-    more = null_space @ inverse @ (turning_rad[:, :, None] - turn @ step)
-    held = np.linalg.norm((turn @ more)[:, :, 0], axis=1)
-    if sum(ranks) == _FREEDOMS:
+    more = null_space @ inverse @ (error_rad[:, :, None] - turn @ step)
+    possible = np.linalg.norm((turn @ more)[:, :, 0], axis=1)
+    if sum(ranks) == 6:
         # every orientation can be met, in another pose if not here
-        held = np.where(aligned, np.linalg.norm(turning_rad, axis=1), held)
-    return (step + more)[:, :, 0], held, stretched | aligned
+        possible = np.where(aligned, np.linalg.norm(error_rad, axis=1), possible)
+    return (step + more)[:, :, 0], possible, singular | aligned
 
 
 def _inverse_of_rank(matrices: FloatArray, rank: int, unprojected: FloatArray) -> tuple[FloatArray, BoolArray]:
@@ -164,7 +169,7 @@ def _inverse_of_rank(matrices: FloatArray, rank: int, unprojected: FloatArray) -
     """
     u, size, vt = np.linalg.svd(matrices, full_matrices=False)
     size = size[:, :rank]
-    lost = size <= _LOST * np.linalg.norm(unprojected, axis=(1, 2))[:, None]
+    lost = size <= _SINGULAR_SHARE * np.linalg.norm(unprojected, axis=(1, 2))[:, None]
     shares = np.where(lost, 0.0, 1.0 / np.where(lost, 1.0, size))
     return (vt[:, :rank].transpose(0, 2, 1) * shares[:, None]) @ u[:, :, :rank].transpose(0, 2, 1), lost.any(axis=1)
 
@@ -176,17 +181,17 @@ def end_of(legs: Legs, leg: Leg, actuators: FloatArray) -> PoseGuess:
     return PoseGuess(way.place, way.turn, passive)
 
 
-def bar_lengths(legs: Legs, drive_range: FloatArray, place: Place, twists: FloatArray) -> FloatArray:
-    """Lengths (n, K) of driven bars at places of the platform, NaN where one is outside of its range (K, 2).
+def bar_lengths(legs: Legs, drive_range: FloatArray, poses: PoseArrays, twists: FloatArray) -> FloatArray:
+    """Lengths (n, K) of driven bars at poses of the platform, NaN where one is outside of its range (K, 2).
 
-    place: its positions (n, 3) and orientations (n, 3, 3); twists (n or 1, sites, 6).
+    poses: its positions (n, 3) and orientations (n, 3, 3); twists (n or 1, sites, 6).
     """
-    poses = PoseGuess(*place, np.zeros((len(place[0]), 0)))
-    none, given = np.zeros((len(place[0]), len(drive_range))), Twists(legs, twists)
+    guess = PoseGuess(*poses, np.zeros((len(poses[0]), 0)))
+    none, given = np.zeros((len(poses[0]), len(drive_range))), Twists(legs, twists)
     needed = none.copy()
     for leg in legs.legs:
         if leg.bar:
-            way = walk(legs, leg, none, poses.passive, given)
-            needed[:, leg.bar.drive] = -bar_pose(legs, leg, way, poses, none, given).lack_mm
+            way = walk(legs, leg, none, guess.passive, given)
+            needed[:, leg.bar.drive] = -bar_pose(legs, leg, way, guess, none, given).lack_mm
     low, high = np.asarray(drive_range, dtype=float).T
     return np.where(((needed >= low) & (needed <= high)).all(axis=1, keepdims=True), needed, np.nan)

@@ -115,7 +115,7 @@ class Legs:
     home_turn: FloatArray = field(default_factory=lambda: _NO_TURN)
     reflectors: tuple[str, ...] = ()
     coupling: FloatArray | None = None
-    hands: tuple[tuple[str, ...], ...] = ()
+    end_effectors: tuple[tuple[str, ...], ...] = ()
 
     def __post_init__(self) -> None:
         owner: dict[str, tuple[Joint, tuple[Joint, ...]]] = {}
@@ -131,7 +131,7 @@ class Legs:
     @property
     def arm_joints(self) -> tuple[str, ...]:
         """Names of the turning joints of an arm (one leg without a bar) or of arms with separate ends; else none."""
-        if (len(self.legs) > 1 and not self.hands) or self.legs[0].bar:
+        if (len(self.legs) > 1 and not self.end_effectors) or self.legs[0].bar:
             return ()
         return tuple(joint.name for joint in self.joints if joint.kind == "R")
 
@@ -184,7 +184,7 @@ class Legs:
     @cached_property
     def groups(self) -> tuple[tuple[int, ...], ...]:
         """Numbers of the legs of each group: legs that share passive joints; all legs if they have separate ends."""
-        if self.hands:
+        if self.end_effectors:
             return (tuple(range(len(self.legs))),)
         result: list[list[int]] = []
         for number, leg in enumerate(self.legs):

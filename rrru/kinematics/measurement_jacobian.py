@@ -10,7 +10,13 @@ from rrru.arrays import FloatArray, IntArray
 from rrru.kinematics.chain import Poses
 from rrru.kinematics.legs import TOOL, WORLD
 from rrru.kinematics.parameter_jacobian import TwistMap
-from rrru.kinematics.readings import Readings, reflector_numbers, slope_of_turns, turn_lacking, turned_by
+from rrru.kinematics.readings import (
+    Readings,
+    inverse_right_jacobian,
+    orientation_residual,
+    reflector_numbers,
+    turned_by,
+)
 
 if TYPE_CHECKING:
     from rrru.kinematics.robot import Robot
@@ -114,11 +120,11 @@ class ReadingMap(TwistMap):
     def _with_turns(self, shifts: FloatArray, turns: Callable[[], FloatArray]) -> FloatArray:
         """Changes (m, 3, k) of what is read from those of positions (n, 3, k) and, made when needed, of turns."""
         readings = self._readings
-        if not len(readings.turned):
+        if not len(readings.oriented):
             return shifts
-        return np.concatenate([shifts, readings.characteristic_length_mm * self._slope @ turns()[readings.turned]])
+        return np.concatenate([shifts, readings.characteristic_length_mm * self._slope @ turns()[readings.oriented]])
 
     @cached_property
     def _slope(self) -> FloatArray:
         """Derivatives (k, 3, 3) of the residual rotation vectors with respect to the model's turn."""
-        return slope_of_turns(turn_lacking(self._robot, self._readings, self.poses, self._at))
+        return inverse_right_jacobian(orientation_residual(self._robot, self._readings, self.poses, self._at))

@@ -54,19 +54,19 @@ class Readings:
         return len(self.position_mm)
 
     @property
-    def plain(self) -> bool:
+    def tool_positions_only(self) -> bool:
         """Whether only positions of the tool were read."""
         return self.reflectors is None and self.turn is None
 
     @cached_property
-    def turned(self) -> IntArray:
+    def oriented(self) -> IntArray:
         """Poses (k,) whose orientation was read."""
         return np.flatnonzero(_known(self.turn)) if self.turn is not None else np.zeros(0, dtype=int)
 
     @cached_property
     def rows(self) -> IntArray:
         """Pose (m,) of each row of a residual."""
-        return np.concatenate([np.arange(len(self)), self.turned])
+        return np.concatenate([np.arange(len(self)), self.oriented])
 
     def of(self, rows: Rows) -> "Readings":
         """The readings of some poses."""
@@ -79,9 +79,9 @@ class Readings:
 
 
 def place_on_platform(robot: "Robot", twists: FloatArray, readings: Readings | None = None) -> FloatArray:
-    """Places (n or 1, 3) of what is read, in the platform's frame, under twists (n or 1, sites, 6).
+    """Positions (n or 1, 3) of what is read, in the platform's frame, under twists (n or 1, sites, 6).
 
-    Reflectors that are fixed to the world have places in the robot's frame.
+    Reflectors that are fixed to the world have positions in the robot's frame.
     """
     numbers, tool_mm = robot.legs.site_numbers, np.asarray(robot.tool_mm)
     tool = twists[:, numbers[TOOL]]
@@ -116,29 +116,37 @@ def orientation(robot: "Robot", poses: Poses, twists: FloatArray) -> FloatArray:
     return world @ poses.turn @ tool
 
 
-def lacking(robot: "Robot", readings: Readings, poses: Poses, twists: FloatArray) -> FloatArray:
+def reading_residual(robot: "Robot", readings: Readings, poses: Poses, twists: FloatArray) -> FloatArray:
     """Residual (m, 3) of readings at Poses under twists (n or 1, sites, 6): what was read minus the model."""
     position = readings.position_mm - robot.measured(poses, twists, readings)
-    if not len(readings.turned):
+    if not len(readings.oriented):
         return position
-    return np.concatenate([position, readings.characteristic_length_mm * turn_lacking(robot, readings, poses, twists)])
+    return np.concatenate(
+        [position, readings.characteristic_length_mm * orientation_residual(robot, readings, poses, twists)]
+    )
 
 
-def turn_lacking(robot: "Robot", readings: Readings, poses: Poses, twists: FloatArray) -> FloatArray:
+def orientation_residual(robot: "Robot", readings: Readings, poses: Poses, twists: FloatArray) -> FloatArray:
     """Rotation vectors (k, 3) from the model's orientations to those that were read; NaN where the model has none."""
-    result = np.full((len(readings.turned), 3), np.nan)
+    result = np.full((len(readings.oriented), 3), np.nan)
     if readings.turn is None:
         return result
-    model = orientation(robot, poses, twists)[readings.turned]
+    model = orientation(robot, poses, twists)[readings.oriented]
     good = _known(model)
-    off = readings.turn[readings.turned[good]] @ model[good].transpose(0, 2, 1)
+    off = readings.turn[readings.oriented[good]] @ model[good].transpose(0, 2, 1)
     result[good] = Rotation.from_matrix(off).as_rotvec() if good.any() else 0.0
     return result
 
 
-def slope_of_turns(lack: FloatArray) -> FloatArray:
-    """Decrease (k, 3, 3) of rotation vectors (k, 3) by a small turn of the model: Jr^-1 to second order in them."""
-    cross = np.cross(lack[:, None, :], _EYE).transpose(0, 2, 1)
+def inverse_right_jacobian(vectors: FloatArray) -> FloatArray:
+    """Inverse right Jacobians (k, 3, 3) of SO(3) at rotation vectors v (k, 3), to second order in v.
+
+        Jr^-1(v) = I + [v]x / 2 + [v]x^2 / 12
+
+    A small rotation w of the model changes the residual v = log(R_read R_model^T) by -Jr^-1(v) w. Source: Sola, Deray
+    and Atchuthan, A micro Lie theory for state estimation in robotics, arXiv:1812.01537, appendix B.
+    """
+    cross = np.cross(vectors[:, None, :], _EYE).transpose(0, 2, 1)
     return np.asarray(_EYE + 0.5 * cross + cross @ cross / 12.0)
 
 

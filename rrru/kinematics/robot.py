@@ -60,7 +60,7 @@ class Robot(ABC):
     # of its links
     point_masses: tuple[PointMass, ...] = ()
     # what a campaign measures in addition to the tool's position, and what is unknown about it
-    reads: MeasurementConfig = MeasurementConfig()
+    measurement_config: MeasurementConfig = MeasurementConfig()
     # whether positions and their slopes are found without poses
     closed_form = False
 
@@ -92,7 +92,7 @@ class Robot(ABC):
             """That of the farthest reachable point, or size_mm."""
 
         @property
-        def freedoms(self) -> tuple[int, int]:
+        def degrees_of_freedom(self) -> tuple[int, int]:
             """Degrees of freedom of position and, in addition, of orientation, of a robot that orients its platform."""
 
         @property
@@ -149,13 +149,15 @@ class Robot(ABC):
         """The legs, closed."""
         return Closure(self.legs)
 
-    def reading(self, reads: MeasurementConfig) -> "Robot":
+    def with_measurement_config(self, config: MeasurementConfig) -> "Robot":
         """The robot for a campaign with unknowns besides its own parameters, see `MeasurementConfig`."""
         from rrru.kinematics.augmented_robot import AugmentedRobot
 
-        return AugmentedRobot(self, reads) if reads.reflectors or reads.turned or reads.frame else self
+        return AugmentedRobot(self, config) if config.reflectors or config.turned or config.frame else self
 
-    def seen_at(self, _actuators: FloatArray, _position_mm: FloatArray, _readings: Readings | None = None) -> "Robot":
+    def with_identifiable_parameters(
+        self, _actuators: FloatArray, _position_mm: FloatArray, _readings: Readings | None = None
+    ) -> "Robot":
         """The robot with its parameters reduced to the identifiable ones at poses; most robots have a fixed set."""
         return self
 
@@ -187,7 +189,7 @@ class Robot(ABC):
         return ()
 
     @property
-    def offered(self) -> BoolArray:
+    def candidate_components(self) -> BoolArray:
         """Which components (sites, 6) of constant twists its parameters are chosen from; none for a fixed set."""
         return np.zeros((len(self.legs.sites), 6), dtype=bool)
 
@@ -237,7 +239,7 @@ class Robot(ABC):
         """
         given = self.twists() if twists is None else twists
         place = place_on_platform(self, given, readings)
-        if readings is None or readings.plain:
+        if readings is None or readings.tool_positions_only:
             return TwistMap(self.model, actuators, poses, twists, place)
         return ReadingMap(self, actuators, poses, given, place, readings)
 

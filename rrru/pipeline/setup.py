@@ -50,11 +50,13 @@ def as_measured(
 
     targets: reflectors with stated places; registered: whether the frame was registered.
     """
-    robot = robot.reading(rows.reads(measurements, targets, registered))
+    robot = robot.with_measurement_config(rows.measurement_config(measurements, targets, registered))
     measurements = register_measurements(measurements, robot)
     known = measurements[rows.usable(measurements)]
     actuators = rows.actuators(known, robot)
-    result: Robot = robot.seen_at(actuators, rows.command(known), rows.readings(known, robot.characteristic_length_mm))
+    result: Robot = robot.with_identifiable_parameters(
+        actuators, rows.command(known), rows.readings(known, robot.characteristic_length_mm)
+    )
     return result
 
 

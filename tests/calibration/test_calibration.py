@@ -80,7 +80,7 @@ def _simplex_search(residuals, centre, scale):
 
     def objective(q):
         deviations = centre + scale * q
-        return residuals.mean_distance(deviations[None])[0] if parameters.hold(deviations) else 1e6
+        return residuals.mean_distance(deviations[None])[0] if parameters.contains(deviations) else 1e6
 
     options = {"maxiter": 40_000, "maxfev": 40_000, "xatol": 1e-6, "fatol": 1e-12, "adaptive": True}
     return min(
@@ -104,7 +104,7 @@ def test_least_mean_distance_equals_a_derivative_free_search(rich_poses, count):
 
 def parameters_inside(residuals, fit):
     """Fitted errors, off the bounds by a hair."""
-    return residuals.mechanism.parameters.inside(fit.deviations)
+    return residuals.mechanism.parameters.clipped_inside(fit.deviations)
 
 
 def test_least_mean_distance_does_not_depend_on_the_start(rich_poses):
@@ -119,7 +119,7 @@ def test_least_mean_distance_stays_in_the_bounds(rich_poses):
     residuals = TargetPositions(Rrru3(length_limit_mm=0.5), theta, free.measured_mm, points)
     fit = least_mean_distance(residuals, calibrate(residuals).deviations)
     parameters = residuals.mechanism.parameters
-    assert parameters.hold(fit.deviations) and fit.at_bound[6] and np.isnan(fit.standard_errors[6])
+    assert parameters.contains(fit.deviations) and fit.at_bound[6] and np.isnan(fit.standard_errors[6])
     scale = np.where(np.isfinite(fit.standard_errors), fit.standard_errors, 1e-3)
     assert fit.mean_mm <= _simplex_search(residuals, parameters_inside(residuals, fit), scale) * (1.0 + 1e-5)
     assert fit.mean_mm > least_mean_distance(free, np.zeros(7)).mean_mm

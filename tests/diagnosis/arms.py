@@ -81,7 +81,7 @@ def problem_of(frame, *names, library=None):
 
 def reading(frame):
     """The arm with every parameter that a table's readings determine."""
-    return replace(ARM, parameter_set="full").reading(rows.reads(frame))
+    return replace(ARM, parameter_set="full").with_measurement_config(rows.measurement_config(frame))
 
 
 def reads_of(sites):

@@ -165,7 +165,7 @@ def _soft(robot, payload_kg, noise_mm=0.02, effects=("drive_compliance", "encode
     position = built.measured(built.solve(drive, rows.command(frame), twists), twists)
     frame = frame.assign(**rows.vector_columns("measured", position + noise_mm * generator.standard_normal((120, 3))))
     settings = GapSettings(effects, draws=20)
-    seen = replace(robot, parameter_set="full").reading(rows.reads(frame))
+    seen = replace(robot, parameter_set="full").with_measurement_config(rows.measurement_config(frame))
     return diagnose(frame, MeasuredRobot(seen, arms.MASSES, noise_mm), settings)
 
 

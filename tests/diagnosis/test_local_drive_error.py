@@ -57,7 +57,7 @@ def measured():
         **rows.vector_columns("measured", reached),
         **rows.turn_columns("measured", turn),
     )
-    return robot.reading(rows.reads(frame)), frame
+    return robot.with_measurement_config(rows.measurement_config(frame)), frame
 
 
 def test_a_local_error_of_one_encoder_is_its_error_function(measured):

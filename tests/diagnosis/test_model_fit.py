@@ -54,7 +54,7 @@ def test_derivatives_are_those_of_the_exact_model(terms):
     generator = np.random.default_rng(1)
     size = np.where(np.isfinite(parameters.wide_sd), parameters.wide_sd, parameters.sd)
     # geometric errors of the size that robots have, not of their weak prior
-    size[parameters.places["geometry"]] = [1e-3] * 3 + [0.3] * 4
+    size[parameters.slices["geometry"]] = [1e-3] * 3 + [0.3] * 4
     values = parameters.clipped(parameters.mean + 0.3 * size * np.abs(generator.standard_normal(len(size))))
     found = model.jacobian(values)
     for number, step in enumerate(1e-3 * size):
@@ -64,7 +64,7 @@ def test_derivatives_are_those_of_the_exact_model(terms):
         np.testing.assert_allclose(
             found[..., number], slope, atol=2e-3 * scale + 1e-9, err_msg=parameters.names[number]
         )
-    assert (WEIGHT in parameters.places) == any(t.effect in ("drive_compliance", "link_flexure") for t in terms)
+    assert (WEIGHT in parameters.slices) == any(t.effect in ("drive_compliance", "link_flexure") for t in terms)
 
 
 def _objective(fit, values):

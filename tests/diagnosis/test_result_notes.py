@@ -60,8 +60,8 @@ def _measured(robot, errors, generator, place_mm=None, known=True):
     seen = seen + _NOISE_MM * generator.standard_normal(seen.shape)
     drives = dict(zip(robot.parts.columns, driven.T, strict=True))
     frame = frame.assign(**drives, **rows.vector_columns("command", command), **rows.vector_columns("measured", seen))
-    robot = robot.reading(rows.reads(frame, () if known is False else ("ball",)))
-    robot = robot.seen_at(driven, command, rows.readings(frame, robot.characteristic_length_mm))
+    robot = robot.with_measurement_config(rows.measurement_config(frame, () if known is False else ("ball",)))
+    robot = robot.with_identifiable_parameters(driven, command, rows.readings(frame, robot.characteristic_length_mm))
     return make_diagnosis_problem(frame, with_wide_bounds(robot), Masses(0.0, 0.0, 0.0), _NOISE_MM, {})
 
 

@@ -18,7 +18,7 @@ _EFFECTS = GapSettings(("backlash", "drive_compliance", "encoder_eccentricity"),
 def _of_arm(frame):
     """Diagnosis of a table of the arm."""
     robot = arms.reading(frame)
-    robot = robot.seen_at(
+    robot = robot.with_identifiable_parameters(
         rows.actuators(frame, robot), rows.command(frame), rows.readings(frame, arms.ARM.characteristic_length_mm)
     )
     return diagnose(frame, MeasuredRobot(robot, arms.MASSES, arms.NOISE_MM, "arm", arms.NOISE_RAD), _EFFECTS)

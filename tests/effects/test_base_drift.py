@@ -48,7 +48,7 @@ def test_reflectors_beside_the_robot_and_on_it_move_alike():
     places = {"on_tool": (60.0, 20.0, 110.0), "on_table": (500.0, -300.0, 0.0)}
     names, motion = list(places), _motion()
     count, sites = len(motion), [f"reflector {name}" for name in places]
-    robot = arms.ARM.reading(arms.reads_of(sites))
+    robot = arms.ARM.with_measurement_config(arms.reads_of(sites))
     twists = EFFECT.contribute(replace(motion, robot=robot), _VALUES).twists
     poses = robot.solve(motion.drive, motion.position_mm)
     for name, site in zip(names, sites, strict=True):

@@ -122,7 +122,7 @@ def test_three_typical_sizes_lie_within_the_bounds(name):
     for shape in effect.coordinates.shapes:
         for sign in (1.0, -1.0):
             coordinates = np.where(effect.coordinates.positive, 1.0, sign) * 3.0 * effect.coordinates.typical
-            assert effect.parameters.hold(effect.coordinates.to_values(coordinates, shape))
+            assert effect.parameters.contains(effect.coordinates.to_values(coordinates, shape))
 
 
 @pytest.mark.parametrize("name", EFFECTS)
@@ -171,7 +171,7 @@ def test_sine_and_cosine_parts_give_back_amplitude_and_phase(parts):
     for name, periods in _PERIODS.items():
         effect = EFFECTS[name]
         values = effect.coordinates.to_values(np.array(parts), effect.coordinates.shapes[0])
-        assert effect.parameters.hold(values)
+        assert effect.parameters.contains(values)
         sine, cosine = np.reshape(parts, (3, 2)).T
         angle = periods * _MOTION.drive
         expected = sine * np.sin(angle) + cosine * np.cos(angle)

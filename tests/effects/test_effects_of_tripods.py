@@ -85,7 +85,7 @@ def test_an_effect_says_what_it_is_and_is_nothing_at_its_nominal_parameters(name
         all(p.unit and p.source for p in effect.parameters)
         and np.isfinite([effect.parameters.low, effect.parameters.high]).all()
     )
-    assert effect.parameters.hold(_values(effect))
+    assert effect.parameters.contains(_values(effect))
     assert not np.any(effect.contribute(motion, effect.parameters.nominal).twists)
     assert np.any(effect.contribute(motion, _values(effect)).twists)
 

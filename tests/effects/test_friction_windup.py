@@ -80,7 +80,7 @@ def test_points_at_which_the_angle_is_unknown_are_passed_over():
 def test_slides_have_a_travel_of_their_own_and_drives_act_alone():
     sliding = find("friction_windup", Ptt3())
     assert "travel_mm" in sliding.parameters.names and "travel_rad" not in sliding.parameters.names
-    assert sliding.parameters.hold(sliding.coordinates.to_values(sliding.coordinates.typical, {"travel_mm": 5.0}))
+    assert sliding.parameters.contains(sliding.coordinates.to_values(sliding.coordinates.typical, {"travel_mm": 5.0}))
 
 
 def _wound_robot(amplitudes, travel, seed=3):

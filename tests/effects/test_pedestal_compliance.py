@@ -108,9 +108,9 @@ def test_reflectors_beside_the_robot_are_found_and_one_taken_for_another_is_name
 
 def test_the_diagnosis_names_the_pedestal(found):
     table = found.measurements
-    robot = ARM.reading(rows.reads(table, (), True))
+    robot = ARM.with_measurement_config(rows.measurement_config(table, (), True))
     used = table[rows.usable(table)]
-    robot = robot.seen_at(rows.actuators(used, robot), rows.command(used), rows.readings(used))
+    robot = robot.with_identifiable_parameters(rows.actuators(used, robot), rows.command(used), rows.readings(used))
     names = ("drive_compliance", "encoder_eccentricity", "pedestal_compliance")
     result = diagnose(table, MeasuredRobot(robot, _NOTHING, 0.01), GapSettings(names, draws=10))
     assert result.verdict["effects"] == "pedestal_compliance" and result.verdict["where"] == "world"

@@ -150,7 +150,7 @@ def outcome_of(kind, seed, **options):
 
 def _least_of_frames(campaign, problem, nominal):
     """Least sum of squares of frames alone, from the true ones."""
-    numbers = open_numbers(problem.mechanism.reads)
+    numbers = open_numbers(problem.mechanism.measurement_config)
     observations = FrameObservations(problem, nominal, frame_directions(problem.mechanism))
     whole = replace(problem.mechanism, among=(), sample=None, parameter_set="frame")
     true = whole.parameters.mapping(true_deviations(campaign, replace(problem, mechanism=whole)))

@@ -74,7 +74,7 @@ def draw_campaign(kind, seed, roughness=1.0, spread=1.0):
     frame = np.concatenate([_direction(draw) * draw.uniform(0.0, _FRAME_MM), Rotation.random(rng=draw).as_rotvec()])
     targets, number = np.tile(names, len(actuators)), np.repeat(np.arange(len(actuators)), len(names))
     errors = {name: roughness * value for name, value in _errors(robot, draw).items()}
-    real = robot.reading(MeasurementConfig(tuple(rows.sites(pd.Series(names))), frame=True))
+    real = robot.with_measurement_config(MeasurementConfig(tuple(rows.sites(pd.Series(names))), frame=True))
     twists = real.twists_of(errors)
     twists[0, real.legs.site_numbers[WORLD]] = frame
     poses = real.solve(actuators[number], position[number], twists)

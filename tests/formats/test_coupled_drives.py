@@ -136,7 +136,7 @@ def test_the_chests_axis_is_one_of_those_that_may_be_off():
 def test_a_full_calibration_finds_a_wrong_robot():
     """The errors of drives, chest and links are found, except unidentifiable ones; 60 poses, no noise."""
     full = replace(ROBOT, parameter_set="full", angle_limit_rad=0.3, length_limit_mm=100.0)
-    robot = full.seen_at(NEAR, ROBOT.forward(NEAR))
+    robot = full.with_identifiable_parameters(NEAR, ROBOT.forward(NEAR))
     names = robot.parameters.names
     # the torso's offsets and the chest's own are separable
     assert {"dtorso1", "dtorso2", "dright3"} <= set(names) and len(names) > 40

@@ -92,7 +92,7 @@ OPEN = '<keyframe><key qpos="0.3 0 0"/></keyframe>'
             servos("crank"),
             "",
             "coupler",
-            "joint crank follows pivot and is driven besides",
+            "joint crank follows pivot and has an actuator, too",
         ),
         (
             FOUR_BAR,

@@ -14,7 +14,7 @@ from rrru.errors import ConfigError
 from rrru.estimation.observations.target_positions import TargetPositions
 from rrru.kinematics.base_parameters import MeasurementConfig
 from rrru.kinematics.dynamics import GRAVITY_MM_S2, Masses, gravity
-from rrru.kinematics.readings import Readings, lacking
+from rrru.kinematics.readings import Readings, reading_residual
 from rrru.robots.catalogue import make_mechanism
 from tests.formats.mjcf import file_of
 from tests.places import ROOT
@@ -76,14 +76,14 @@ def test_what_nobody_knows_is_no_pose():
 
 def test_the_effect_of_every_site_and_drive_is_the_slope_of_what_is_read():
     """Against central differences through the exact chains, with finite twists at all sites."""
-    robot = ROBOT.reading(MeasurementConfig(tuple(SITES.values()), tuple(SITES.values()), frame=True))
+    robot = ROBOT.with_measurement_config(MeasurementConfig(tuple(SITES.values()), tuple(SITES.values()), frame=True))
     generator = np.random.default_rng(4)
     twists = generator.normal(size=(COUNT, len(robot.legs.sites), 6)) * np.repeat([0.5, 5e-3], 3)
     poses, readings = robot.solve(DRIVES, _own(), twists), _readings(_own())
     at = robot.map(DRIVES, poses, twists, readings)
 
     def read(drives, twists):
-        return -lacking(robot, readings, robot.model.solve(drives, poses, twists), twists)
+        return -reading_residual(robot, readings, robot.model.solve(drives, poses, twists), twists)
 
     for number, site in enumerate(robot.legs.sites):
         for k, step in enumerate(_STEPS):
@@ -167,9 +167,11 @@ def test_both_hands_tell_a_full_set_of_parameters():
     """Shoulders off by tens of mrad, everything else by millimetres and milliradians, in a frame of the instrument."""
     generator = np.random.default_rng(5)
     reads = MeasurementConfig(tuple(SITES.values()), tuple(SITES.values()), frame=True)
-    robot = replace(ROBOT, parameter_set="full", angle_limit_rad=0.5, length_limit_mm=200.0).reading(reads)
+    robot = replace(ROBOT, parameter_set="full", angle_limit_rad=0.5, length_limit_mm=200.0).with_measurement_config(
+        reads
+    )
     readings = _readings(_own())
-    robot = robot.seen_at(DRIVES, _own(), readings)
+    robot = robot.with_identifiable_parameters(DRIVES, _own(), readings)
     sizes = np.where(np.array(robot.parameters.units) == "mm", 3.0, 5e-3)
     true = sizes * generator.uniform(-1.0, 1.0, len(sizes))
     for name in ("dright0", "dright1", "dleft0", "dleft1"):
@@ -184,7 +186,11 @@ def test_both_hands_tell_a_full_set_of_parameters():
 
 def test_frames_alone_are_a_set_of_parameters():
     reads = MeasurementConfig(tuple(SITES.values()), tuple(SITES.values()), frame=True)
-    robot = replace(ROBOT, parameter_set="frame").reading(reads).seen_at(DRIVES, _own(), _readings(_own()))
+    robot = (
+        replace(ROBOT, parameter_set="frame")
+        .with_measurement_config(reads)
+        .with_identifiable_parameters(DRIVES, _own(), _readings(_own()))
+    )
     assert len(robot.parameters) == 12
     assert {name.rpartition("_")[0] for name in robot.parameters.names} == {
         "reflector_right",
@@ -213,7 +219,7 @@ def test_a_urdf_with_several_tips_is_the_same_robot(tmp_path):
 
 def test_a_key_says_what_a_hand_carries():
     robot = make_mechanism("two_arms", two_arms.section(carries={"right": ["r1", "r2"]}))
-    assert robot.legs.hands == (("r1", "r2"), ("left",))
+    assert robot.legs.end_effectors == (("r1", "r2"), ("left",))
     np.testing.assert_allclose(
         robot.guess(DRIVES[:2], ["r2", "left"]), [two_arms.seen(DRIVES[0], "right"), two_arms.seen(DRIVES[1], "left")]
     )
@@ -266,5 +272,5 @@ def test_orientation_of_each_hand_is_read():
     turn = poses.turn.copy()
     turn[ARM == "left"] = turn[ARM == "left"] @ Rotation.from_rotvec([0.01, -0.02, 0.005]).as_matrix()
     readings = Readings(_own(), turn=turn, characteristic_length_mm=500.0)
-    left = lacking(ROBOT, readings, ROBOT.solve(DRIVES, _own(), twists), twists)
+    left = reading_residual(ROBOT, readings, ROBOT.solve(DRIVES, _own(), twists), twists)
     np.testing.assert_allclose(left, 0.0, atol=1e-6)

@@ -8,6 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from rrru.errors import UnreachableError
 from rrru.formats.robot_file import from_mjcf
+from rrru.kinematics.inverse import inverse_kinematics
 from rrru.robots.catalogue import make_mechanism
 from tests.formats.mjcf import CRANKED, CRANKED_JOINTS, mjcf, servos
 
@@ -84,9 +85,9 @@ def test_a_drive_without_a_range_harms_nothing():
     points = robot.legs.home_mm + np.array([[0.0, 40.0, 30.0]])
     for own in ([1500.0, 1500.0], [-np.inf, np.inf]):
         ranges = np.concatenate([[own], robot.drive_range[1:]])
-        # whose freedoms are those of the whole robot
+        # whose degrees_of_freedom are those of the whole robot
         same = replace(robot, drive_range=ranges)
-        same.__dict__["freedoms"] = robot.freedoms
+        same.__dict__["degrees_of_freedom"] = robot.degrees_of_freedom
         np.testing.assert_allclose(same.forward(same.inverse(points)), points, rtol=0.0, atol=1e-6)
 
 
@@ -94,6 +95,15 @@ def test_a_place_that_is_no_number_has_no_drives():
     robot = _arm(_SCARA)
     found = robot.inverse(np.array([[np.nan, 0.0, 300.0], [400.0, 50.0, 320.0]]))
     assert np.isnan(found[0]).all() and np.isfinite(found[1]).all()
+
+
+def test_the_start_of_a_search_is_not_changed():
+    robot = _arm(_SIX)
+    points = robot.legs.home_mm + np.array([[0.0, 40.0, 30.0]])
+    start = robot.legs.home_drives[None].copy(), robot.legs.home_mm[None].copy()
+    found = inverse_kinematics(robot, (points, robot.legs.home_turn[None]), start, robot.twists())
+    assert np.abs(found - robot.legs.home_drives).max() > 1e-3
+    np.testing.assert_array_equal(start[0], robot.legs.home_drives[None])
 
 
 def test_a_plan_keeps_within_the_ranges_of_the_drives():

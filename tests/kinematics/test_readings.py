@@ -11,7 +11,7 @@ from rrru.estimation.observations.target_positions import TargetPositions
 from rrru.kinematics.augmented_robot import AugmentedRobot
 from rrru.kinematics.base_parameters import MeasurementConfig
 from rrru.kinematics.legs import TOOL, WORLD
-from rrru.kinematics.readings import Readings, lacking
+from rrru.kinematics.readings import Readings, reading_residual
 from rrru.kinematics.robot import Robot
 from tests.kinematics.test_general_model import GENERAL, ROBOTS, _about_home, _clear
 
@@ -23,7 +23,7 @@ _STEPS = np.repeat([1e-2, 1e-5], 3)
 def _poses(name, **reads):
     """A robot as read, 100 positions and actuator values."""
     robot, points, actuators = _about_home(GENERAL[name]) if name in GENERAL else _clear(name)
-    return robot.reading(MeasurementConfig(tuple(_REFLECTORS), turned=True, **reads)), points, actuators
+    return robot.with_measurement_config(MeasurementConfig(tuple(_REFLECTORS), turned=True, **reads)), points, actuators
 
 
 def _predicted(robot, poses, twists, names, places, on_world=None):
@@ -69,11 +69,11 @@ def setting(request):
     return robot, readings, actuators, twists, poses
 
 
-def test_what_is_lacking_is_read_minus_predicted(setting):
+def test_the_residual_is_read_minus_predicted(setting):
     robot, readings, _, twists, poses = setting
     own = readings.reflectors, readings.place_mm, readings.on_world
     position, turn = _predicted(robot, poses, twists, *own)
-    result = lacking(robot, readings, poses, twists)
+    result = reading_residual(robot, readings, poses, twists)
     np.testing.assert_allclose(result[:100], readings.position_mm - position, rtol=0.0, atol=1e-9)
     odd = np.arange(1, 100, 2)
     np.testing.assert_array_equal(readings.rows, [*range(100), *odd])
@@ -82,7 +82,7 @@ def test_what_is_lacking_is_read_minus_predicted(setting):
     np.testing.assert_allclose(again, readings.turn[odd], rtol=0.0, atol=1e-12)
 
 
-def test_the_effect_of_every_site_and_drive_is_the_slope_of_what_is_lacking(setting):
+def test_the_effect_of_every_site_and_drive_is_minus_the_derivative_of_the_residual(setting):
     """Against central differences through the exact closure, with finite twists at all sites."""
     robot, readings, actuators, twists, poses = setting
     at = robot.map(actuators, poses, twists, readings)
@@ -91,7 +91,7 @@ def test_the_effect_of_every_site_and_drive_is_the_slope_of_what_is_lacking(sett
         ends = []
         for sign in (1.0, -1.0):
             values, moved = change(sign)
-            ends.append(lacking(robot, readings, robot.model.solve(values, poses, moved), moved))
+            ends.append(reading_residual(robot, readings, robot.model.solve(values, poses, moved), moved))
         return (ends[1] - ends[0]) / 2.0
 
     worst, largest = np.zeros(2), np.zeros(2)
@@ -125,7 +125,7 @@ def _read(robot, actuators, points, truth, turned):
 
 def _off(robot, points, actuators, turned):
     """Fit of noise-free readings of drawn deviations, and what it is off by in mm, angles at the robot's arm."""
-    robot = robot.seen_at(actuators, points, _read(robot, actuators, points, {}, turned))
+    robot = robot.with_identifiable_parameters(actuators, points, _read(robot, actuators, points, {}, turned))
     sizes = np.array([0.5 if unit == "mm" else 1e-3 for unit in robot.parameters.units])
     values = np.random.default_rng(9).normal(size=len(sizes)) * sizes
     readings = _read(robot, actuators, points, dict(zip(robot.parameters.names, values.tolist(), strict=True)), turned)
@@ -162,7 +162,7 @@ _CLOSED_FORMS = {
 @pytest.mark.parametrize("name", [*ROBOTS])
 def test_a_robot_as_read_has_every_attribute_of_its_robot(name):
     robot, _, _ = _clear(name)
-    read = robot.reading(MeasurementConfig((*_REFLECTORS,), ("ball a",), frame=True))
+    read = robot.with_measurement_config(MeasurementConfig((*_REFLECTORS,), ("ball a",), frame=True))
     of_every_robot = {*vars(Robot), *Robot.__annotations__}
     changed = {
         attribute
@@ -172,7 +172,7 @@ def test_a_robot_as_read_has_every_attribute_of_its_robot(name):
     }
     missing = changed - {*vars(AugmentedRobot), *AugmentedRobot.__dataclass_fields__} - _CLOSED_FORMS
     assert not missing, f"AugmentedRobot has the default of {missing}: add it to its list of the robot's own"
-    for attribute in Robot.__annotations__.keys() - {"parameters", "legs", "directions", "reads"}:
+    for attribute in Robot.__annotations__.keys() - {"parameters", "legs", "directions", "measurement_config"}:
         assert getattr(read, attribute) is getattr(robot, attribute) or getattr(read, attribute) == getattr(
             robot, attribute
         )
@@ -180,14 +180,14 @@ def test_a_robot_as_read_has_every_attribute_of_its_robot(name):
 
 def test_a_robot_as_read_starts_where_its_robot_starts():
     robot, points, actuators = _clear("rrru3")
-    read = robot.reading(MeasurementConfig((*_REFLECTORS,), turned=True, frame=True))
+    read = robot.with_measurement_config(MeasurementConfig((*_REFLECTORS,), turned=True, frame=True))
     np.testing.assert_allclose(read.forward(actuators), points, atol=1e-6)
-    assert read.reading(MeasurementConfig(turned=True)).robot is robot
+    assert read.with_measurement_config(MeasurementConfig(turned=True)).robot is robot
 
 
 def test_a_robot_as_read_knows_the_deviations_of_its_robot_and_its_own():
     robot, points, actuators = _clear("rrru3")
-    read = robot.reading(MeasurementConfig((*_REFLECTORS,), ("ball a",), frame=True))
+    read = robot.with_measurement_config(MeasurementConfig((*_REFLECTORS,), ("ball a",), frame=True))
     for deviation in robot.deviation_names:
         twists = read.twists_of({deviation: 1e-3, "world_x": 0.3})
         poses = read.solve(actuators, points, twists)

@@ -24,12 +24,12 @@ from rrru.campaign.ingest.geometry import (
 from rrru.campaign.ingest.gross_errors import GrossError, find_gross_error, frame_advice
 from rrru.campaign.ingest.gross_file import ORDINARY_SHARE, GrossFile
 from rrru.campaign.ingest.guess import guess_columns
-from rrru.campaign.ingest.mounting import Mounting, check_turned, mounting, places_instead
 from rrru.campaign.ingest.outliers import jumps, outliers
 from rrru.campaign.ingest.problems import Problems
 from rrru.campaign.ingest.registration import Registration, register
 from rrru.campaign.ingest.sheet import COMMAND, MEASURED, NOISE, TARGET, TURNS, Sheet, rows_text
 from rrru.campaign.ingest.spec import MM, IngestSpec
+from rrru.campaign.ingest.target_placement import TargetPlacement, check_turned, places_instead, target_placement
 from rrru.campaign.measurements import command, measured, turn_columns, turns, vector_columns
 from rrru.errors import ConfigError, FitError, IngestError, MistakeError
 from rrru.kinematics.robot import Robot
@@ -58,7 +58,7 @@ def ingest(spec: IngestSpec, mechanism: Robot) -> Ingested:
     if not check_commands(sheet):
         sheet.problems.refuse()
     check_speed(sheet)
-    mounted = mounting(sheet) if not sheet.problems else None
+    mounted = target_placement(sheet) if not sheet.problems else None
     same = check_sizes(sheet, mounted.offset_mm if mounted else 0.0)
     # where reflectors sit is looked at in a file without problems only: without their offsets nothing is too far off
     if same and spec.frame == "robot" and (mounted or "target" not in sheet.frame):
@@ -176,7 +176,7 @@ def _refuse(sheet: Sheet, gross: GrossError, driven: bool) -> None:
     sheet.refuse_now(concerned, value, allowed, MistakeError if explained else IngestError)
 
 
-def _at_tool(sheet: Sheet, mounted: Mounting | None) -> Sheet:
+def _at_tool(sheet: Sheet, mounted: TargetPlacement | None) -> Sheet:
     """The sheet with the positions of reflectors carried to the tool, NaN where that is none, in the robot's frame."""
     if mounted is None:
         return sheet
@@ -185,7 +185,7 @@ def _at_tool(sheet: Sheet, mounted: Mounting | None) -> Sheet:
     return replace(sheet, frame=sheet.frame.assign(**moved))
 
 
-def _register_sheet(sheet: Sheet, mounted: Mounting | None, digit_mm: float) -> Registration:
+def _register_sheet(sheet: Sheet, mounted: TargetPlacement | None, digit_mm: float) -> Registration:
     """Registration from the chosen points, without those that a first registration shows to be outliers."""
     frame = sheet.frame
     offset = mounted.offset_mm if mounted else 0.0
@@ -269,7 +269,7 @@ def _notes_on_columns(sheet: Sheet) -> list[str]:
 
 
 def _table(
-    sheet: Sheet, mounted: Mounting | None, registration: Registration | None, digit_mm: float
+    sheet: Sheet, mounted: TargetPlacement | None, registration: Registration | None, digit_mm: float
 ) -> tuple[pd.DataFrame, list[str]]:
     """Frame in the form of the schema of measurements, and notes on implausible values and on outliers."""
     seen, drives = _at_tool(sheet, mounted).frame, sheet.drives

@@ -174,7 +174,7 @@ def check_end_effectors(frame: pd.DataFrame, mechanism: Robot, problems: Problem
 
     A pose belongs to the end effector nearest to the commanded position, so that this has to be the named one's.
     """
-    carried = [target for targets in mechanism.legs.hands for target in targets]
+    carried = [target for targets in mechanism.legs.end_effectors for target in targets]
     if not carried:
         return
     if "target" not in frame:

@@ -61,7 +61,7 @@ def find_contradiction(
         return None
     # the commanded point is the tool of the end effector, whichever target it carries
     x, y, z = robot.tool_mm
-    tools = {name: (x, y, z) for hand in robot.legs.hands for name in hand}
+    tools = {name: (x, y, z) for hand in robot.legs.end_effectors for name in hand}
     unused = [*TARGET, *TURNS["measured"], *(() if tools else ("target",))]
     sent = frame.drop(columns=unused, errors="ignore").assign(**rows.vector_columns("measured", rows.command(frame)))
     file = GrossFile.of(sent, replace(spec, targets=tools, world_targets=()), robot, found, False)

@@ -98,10 +98,12 @@ class GrossFile:
         positions alone are in another unit, which `rrru.campaign.ingest.geometry` checks.
         """
         driven, commanded = set(robot.parts.columns) <= set(frame), set(COMMAND) <= set(frame)
-        if not set(MEASURED) <= set(frame) or not (driven or (commanded and not robot.legs.hands)):
+        if not set(MEASURED) <= set(frame) or not (driven or (commanded and not robot.legs.end_effectors)):
             return None
         names = frame["target"].astype(str).to_numpy() if "target" in frame else np.full(len(frame), "")
-        if robot.legs.hands and not set(names) <= {target for hand in robot.legs.hands for target in hand}:
+        if robot.legs.end_effectors and not set(names) <= {
+            target for hand in robot.legs.end_effectors for target in hand
+        }:
             return None
         known, number = np.unique(names, return_inverse=True)
         drive = frame[[*robot.parts.columns]].to_numpy(dtype=float) if driven else np.zeros((len(frame), 0))
@@ -302,7 +304,7 @@ class GrossFile:
     def _guess(self, values: np.ndarray, at: np.ndarray) -> np.ndarray:
         """Positions (m, 3) near which the poses of drive values (m, K) of some rows are."""
         return np.asarray(
-            self.robot.guess(values, np.array(self.names)[self.target[at]] if self.robot.legs.hands else None)
+            self.robot.guess(values, np.array(self.names)[self.target[at]] if self.robot.legs.end_effectors else None)
         )
 
     def _rows(self, shift: int) -> np.ndarray:

@@ -16,7 +16,7 @@ from scipy.optimize import least_squares
 
 from rrru.kinematics.base_parameters import MeasurementConfig, candidates_of, choose, direction, open_numbers
 from rrru.kinematics.chain import Poses
-from rrru.kinematics.readings import Readings, lacking
+from rrru.kinematics.readings import Readings, reading_residual
 from rrru.kinematics.robot import Robot
 
 # shares of the robot's size: from the first on a residual may be due to zero offsets, above the second only to these;
@@ -108,11 +108,11 @@ def _fitted(
         return None
     framed = frames(poses)
     reflectors = () if seen.reflectors is None else tuple(dict.fromkeys(seen.reflectors.tolist()))
-    reads = MeasurementConfig(reflectors, framed.unknown, frame=True)
-    robot = robot.reading(reads)
+    config = MeasurementConfig(reflectors, framed.unknown, frame=True)
+    robot = robot.with_measurement_config(config)
     readings = replace(seen, position_mm=framed.position_mm, place_mm=framed.place_mm)
     # frame and reflectors first: the drives explain the remainder
-    opened = open_numbers(reads)
+    opened = open_numbers(config)
     numbers = (*opened, *candidates_of(robot.legs, robot.parts)[: len(robot.parts.drives)])
     scale = np.array([1.0 if number.unit == "mm" else 1.0 / robot.characteristic_length_mm for number in numbers])
     directions = scale * np.stack([direction(robot.legs, number) for number in numbers], axis=-1)
@@ -122,7 +122,7 @@ def _fitted(
 
     def residual(sizes: np.ndarray) -> np.ndarray:
         twists = (directions @ sizes)[None]
-        left = lacking(robot, readings, robot.solve(values, near, twists), twists)
+        left = reading_residual(robot, readings, robot.solve(values, near, twists), twists)
         return np.where(np.isfinite(left), left, _LOST_MM).ravel()
 
     def slope(sizes: np.ndarray) -> np.ndarray:

@@ -133,8 +133,8 @@ def _determined(sizes: Mapping[int, tuple[float, float]]) -> dict[int, tuple[flo
 
 def _places(problem: DiagnosisProblem, stated: bool) -> dict[str, FloatArray]:
     """Places (3,) on the platform, before what was found, by site: of reflectors that were found, or stated, too."""
-    reads = problem.mechanism.reads
-    wanted = set(reads.reflectors if stated else reads.fitted)
+    config = problem.mechanism.measurement_config
+    wanted = set(config.reflectors if stated else config.fitted)
     if not wanted:
         return {}
     on_world = rows.on_the_world(problem.measurements)

@@ -194,7 +194,7 @@ def gap_rows(
 def _robot(problem: DiagnosisProblem, section: dict[str, Any]) -> Robot:
     """The robot of a file."""
     robot = make_mechanism(problem.mechanism.name, section, parameter_set="frame")
-    reading: Robot = robot.reading(problem.mechanism.reads)
+    reading: Robot = robot.with_measurement_config(problem.mechanism.measurement_config)
     return reading
 
 
@@ -242,8 +242,8 @@ def _instrument(problem: DiagnosisProblem, robot: Robot, found: Found, corrected
     The frame is the file's, so that reflectors that are not on the robot are moved by it.
     """
     result, numbers = robot.twists(), robot.legs.site_numbers
-    reads = problem.mechanism.reads
-    named = {*reads.fitted, *((TOOL,) if corrected or reads.fitted or reads.turned else ())}
+    config = problem.mechanism.measurement_config
+    named = {*config.fitted, *((TOOL,) if corrected or config.fitted or config.turned else ())}
     for name in named & set(found.twists):
         result[0, numbers[name]] = found.twists[name]
     on_world = rows.on_the_world(problem.measurements)

@@ -112,7 +112,7 @@ def passes(measurements: pd.DataFrame, mechanism: Robot) -> Passes:
     drives = rows.actuators(used, mechanism)
     finite = np.isfinite(known).all(axis=1) & np.isfinite(drives).all(axis=1)
     known, drives = known[finite], drives[finite]
-    if mechanism.legs.hands or target is None or not len(known):
+    if mechanism.legs.end_effectors or target is None or not len(known):
         return _none(mechanism)
     _, first = np.unique(known, axis=0, return_index=True)
     known, drives = known[first], drives[first]

@@ -17,7 +17,7 @@ from rrru.arrays import FloatArray
 from rrru.cache import last_cached
 from rrru.errors import FitError
 from rrru.kinematics.chain import Poses
-from rrru.kinematics.readings import Readings, lacking
+from rrru.kinematics.readings import Readings, reading_residual
 from rrru.kinematics.robot import Robot
 
 
@@ -80,7 +80,7 @@ class TargetPositions:
         """Measured minus predicted (m, 3) in mm at deviations (p,), see `rrru.kinematics.readings.lacking`."""
         if self.readings is None:
             return self.measured_mm - self.model(values)
-        return lacking(self.mechanism, self.readings, *self._poses(values))
+        return reading_residual(self.mechanism, self.readings, *self._poses(values))
 
     @last_cached
     def jacobian(self, deviations: FloatArray) -> FloatArray:

@@ -202,7 +202,7 @@ def bare(name, generator, conditions):
     """A robot with random campaign and deviations, and no acting cause."""
     parameters = conditions.mechanism.parameters
     size = [PARAMETER_SD[unit] for unit in parameters.units]
-    inside = parameters.inside(size * generator.standard_normal(len(size)))
+    inside = parameters.clipped_inside(size * generator.standard_normal(len(size)))
     kind, trajectories = str(generator.choice(list(PASSES))), draw_trajectories(generator, conditions)
     return Robot(name, kind, trajectories, tuple(inside.tolist()))
 

@@ -196,7 +196,7 @@ class Robot(WithheldRobot):
 
     def campaign(self, conditions):
         """The virtual robot and its plan, or None where a parameter of an acting cause violates its bounds."""
-        if not all(one.effect_model.parameters.hold(one.values) for one in self.causes):
+        if not all(one.effect_model.parameters.contains(one.values) for one in self.causes):
             return None
         deviations = conditions.mechanism.parameters.mapping(self.deviations)
         # only r - R is identifiable; its whole error is given to r

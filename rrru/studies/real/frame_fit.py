@@ -31,7 +31,7 @@ _INSTRUMENT_SD_MM = 1e4
 
 def frames(robot: Robot) -> Effect:
     """Placements of robot, tool and reflectors that a campaign does not fix, one coordinate per parameter."""
-    numbers = open_numbers(robot.reads)
+    numbers = open_numbers(robot.measurement_config)
     limits = {"mm": _INSTRUMENT_SD_MM, "rad": np.pi}
     bounds = ((number, limits[number.unit]) for number in numbers)
     parameters = ParameterSet(
@@ -49,7 +49,7 @@ def frames(robot: Robot) -> Effect:
 
 def frame_directions(robot: Robot) -> FloatArray:
     """Twists (sites, 6, c) per unit of each coordinate of `frames`."""
-    return np.stack([direction(robot.legs, one) for one in open_numbers(robot.reads)], axis=-1)
+    return np.stack([direction(robot.legs, one) for one in open_numbers(robot.measurement_config)], axis=-1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +83,7 @@ def fit_frames(problem: DiagnosisProblem, state: ModelState) -> ModelState:
     The search starts at the closed-form registration, so that any rotation of the instrument is allowed. Raises
     FitError where it does not converge, naming the parameters that the readings do not determine.
     """
-    numbers = open_numbers(problem.mechanism.reads)
+    numbers = open_numbers(problem.mechanism.measurement_config)
     observations = FrameObservations(problem, state, frame_directions(problem.mechanism))
     sd = [np.inf if one.unit == "rad" else _INSTRUMENT_SD_MM if WORLD in one.twists else PLACE_SD_MM for one in numbers]
     block = Block.of(FRAMES, [one.name for one in numbers], [one.unit for one in numbers], sd)
@@ -97,7 +97,7 @@ def fit_frames(problem: DiagnosisProblem, state: ModelState) -> ModelState:
 def _start(observations: FrameObservations, numbers: Sequence[Candidate]) -> FloatArray:
     """Coordinates (c,) of the frames by registration of the used points; zero where nothing determines them."""
     problem, nothing = observations.problem, np.zeros(len(numbers))
-    if problem.mechanism.reads.frame:
+    if problem.mechanism.measurement_config.frame:
         poses, twists = problem.posed(observations.state_at(nothing))
         # twists of effects differ from row to row; their mean is good enough for a start
         twists = (twists[problem.used] if len(twists) > 1 else twists).mean(axis=0, keepdims=True)

@@ -80,9 +80,9 @@ def _taken(folder, table, robot, **options):
 def _as_read(robot, found, registered=True, known=()):
     """The robot whose parameters hold what the readings leave open."""
     table = found.measurements
-    robot = robot.reading(rows.reads(table, known, registered))
+    robot = robot.with_measurement_config(rows.measurement_config(table, known, registered))
     readings = rows.readings(table, robot.characteristic_length_mm)
-    return robot.seen_at(rows.actuators(table, robot), rows.command(table), readings)
+    return robot.with_identifiable_parameters(rows.actuators(table, robot), rows.command(table), readings)
 
 
 def test_poses_of_joints_alone_are_brought_into_the_robots_frame(arm, driven, tmp_path):
@@ -193,7 +193,7 @@ def test_reflectors_without_stated_places_are_found(arm, driven, tmp_path, regis
     for name, place in _SPOTS.items():
         np.testing.assert_allclose(places.loc[name].to_numpy().reshape(3, 2), np.stack([place] * 2, axis=1), atol=1e-5)
     robot = _as_read(arm, found, registered, known)
-    assert robot.reads.fitted == tuple(f"reflector {name}" for name in _SPOTS if name not in known)
+    assert robot.measurement_config.fitted == tuple(f"reflector {name}" for name in _SPOTS if name not in known)
     fitted = {name for name in robot.parameters.names if name.startswith("reflector")}
     assert not any(f"reflector_{name}_" in one for name in known for one in fitted)
 
@@ -323,7 +323,7 @@ def test_candidates_of_reflectors_are_shifts_of_the_platforms_frame(arm):
     """A reflector's parameter moves that reflector and nothing else."""
     from rrru.kinematics.base_parameters import MeasurementConfig
 
-    robot = arm.reading(MeasurementConfig(("reflector a", "reflector b"), ("reflector b",)))
+    robot = arm.with_measurement_config(MeasurementConfig(("reflector a", "reflector b"), ("reflector b",)))
     own = [one for one in robot.candidates if one.name.startswith("reflector")]
     assert [one.name for one in own] == ["reflector_b_x", "reflector_b_y", "reflector_b_z"]
     twist = direction(robot.legs, own[1])

@@ -78,7 +78,7 @@ def _file(folder, made, generator, zeros):
 
 
 def _calibrated(found, robot):
-    robot = robot.reading(rows.reads(found.measurements, (), True))
+    robot = robot.with_measurement_config(rows.measurement_config(found.measurements, (), True))
     return calibrate(residuals := select(found.measurements, robot, ["*"])), residuals.mechanism
 
 

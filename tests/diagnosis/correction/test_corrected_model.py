@@ -221,7 +221,7 @@ def attached(tmp_path_factory):
         timed = {"time_s": 5.0 * np.arange(len(tool)) + 1e4 * number, "speed_mm_s": np.nan, "payload_kg": 0.0}
         tables_read.append(pd.DataFrame(columns | numbers | timed))
     frame = pd.concat(tables_read, ignore_index=True)
-    robot = given.reading(rows.reads(frame, _STATED_MM)).seen_at(
+    robot = given.with_measurement_config(rows.measurement_config(frame, _STATED_MM)).with_identifiable_parameters(
         rows.actuators(frame, given), rows.command(frame), rows.readings(frame, given.characteristic_length_mm)
     )
     known = MeasuredRobot(robot, _MASSES, _NOISE_MM, "attached")

@@ -22,7 +22,7 @@ _TILT = np.array([0.012, -0.007])
 def _robot(name, **reads):
     """A robot as read, actuator values (n, K) and positions (n, 3)."""
     robot, points, actuators = _about_home(GENERAL[name]) if name in GENERAL else _clear(name)
-    robot = robot.reading(MeasurementConfig(**reads)).seen_at(actuators, points)
+    robot = robot.with_measurement_config(MeasurementConfig(**reads)).with_identifiable_parameters(actuators, points)
     return robot, actuators, points
 
 

@@ -74,7 +74,7 @@ def _rms(residual_mm):
 def test_calibrations_predict_as_the_reference_does(campaign):
     joints, table, held = campaign
     expected = {"cmd": 0.290, "read": 0.569}[joints]
-    residuals = select(table, _robot().reading(rows.reads(table, (), True)), ["*"])
+    residuals = select(table, _robot().with_measurement_config(rows.measurement_config(table, (), True)), ["*"])
     fit, robot, out = calibrate(residuals), residuals.mechanism, table[held]
     inputs = rows.actuators(out, robot), rows.measured(out), rows.command(out)
     left = TargetPositions(robot, *inputs, rows.readings(out)).residual(fit.deviations)
@@ -85,8 +85,8 @@ def test_calibrations_predict_as_the_reference_does(campaign):
 def _diagnosed(table, effects):
     """The diagnosis with some effects, of the parameters identifiable from the fitted rows."""
     used = table[rows.usable(table)]
-    robot = _robot().reading(rows.reads(table, (), True))
-    robot = robot.seen_at(rows.actuators(used, robot), rows.command(used), rows.readings(used))
+    robot = _robot().with_measurement_config(rows.measurement_config(table, (), True))
+    robot = robot.with_identifiable_parameters(rows.actuators(used, robot), rows.command(used), rows.readings(used))
     return diagnose(table, MeasuredRobot(robot, Masses(0.0, 0.0, 0.0)), GapSettings(effects, draws=50))
 
 

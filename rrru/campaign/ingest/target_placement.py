@@ -47,7 +47,7 @@ _FAR_LESS = 0.2
 
 
 @dataclass(frozen=True)
-class Mounting:
+class TargetPlacement:
     """names (n,) of the reflectors, None where the tool itself is read; place_mm (n, 3): theirs on the platform, or in
     the robot's frame where on_world (n,) says so; offset_mm (n, 3): where they are as seen from the commanded position,
     in the robot's frame, with the zeros that its drives were found to have; turn (3, 3): from the platform to what is
@@ -82,8 +82,11 @@ class Mounting:
         return result
 
 
-def mounting(sheet: Sheet) -> Mounting | None:
-    """The Mounting of a sheet without problems, None where the tool itself is read and no zero offset is lost."""
+def target_placement(sheet: Sheet) -> TargetPlacement | None:
+    """The TargetPlacement of a sheet without problems.
+
+    None where the tool itself is read and no zero offset is lost.
+    """
     frame, registered = sheet.frame, sheet.spec.frame == "register"
     turned, driven = set(TURNS["measured"]) <= set(frame), set(sheet.drives) <= set(frame)
     named = "target" in frame or (turned and registered)
@@ -123,7 +126,7 @@ def mounting(sheet: Sheet) -> Mounting | None:
             turn = np.eye(3)
     seen_from = poses.point(np.asarray(sheet.mechanism.tool_mm)) if not zeros.any() else command
     offset = frames.carriers(poses).point(place) - seen_from
-    return Mounting(
+    return TargetPlacement(
         frames.names if named else None, place, frames.on_world, offset, turn, ~frames.right, bool(zeros.any()), notes
     )
 
@@ -219,7 +222,7 @@ def _in_words(sheet: Sheet, zeros: np.ndarray, left_mm: float) -> tuple[str, ...
 
 
 def check_turned(sheet: Sheet) -> None:
-    """Note orientations in another frame than the robot's, in a sheet that has some and no Mounting."""
+    """Note orientations in another frame than the robot's, in a sheet that has some and no TargetPlacement."""
     if not set(TURNS["measured"]) <= set(sheet.frame):
         return
     turns = rows.turns(sheet.frame, "measured")
