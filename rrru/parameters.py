@@ -1,4 +1,4 @@
-"""Named parameters and the map between names and vectors."""
+"""Named parameters of a robot or an effect, and the map between mappings by name and vectors."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -9,12 +9,10 @@ import numpy.typing as npt
 
 from rrru.errors import ConfigError
 
-LEGS = (1, 2, 3)
-
 
 @dataclass(frozen=True)
 class Parameter:
-    """One parameter of a model: name, unit, nominal value, bounds, their source, its leg (0: all)."""
+    """One parameter of a model: name, unit, nominal value, bounds, source of these, number of its leg (0: all legs)."""
 
     name: str
     unit: str
@@ -63,7 +61,7 @@ class ParameterSet:
 
     @property
     def legs(self) -> np.ndarray:
-        """Legs (p,) that the parameters belong to: 1 to 3, 0 for all."""
+        """Numbers (p,) of the legs that the parameters belong to, from 1; 0 for all legs."""
         return np.array([p.leg for p in self.parameters])
 
     @property

@@ -15,11 +15,13 @@ from rrru.parameters import ParameterSet
 
 @dataclass(frozen=True, eq=False)
 class Block:
-    """Parameters of one kind: k of them, with independent priors.
+    """k parameters of one kind, with independent priors.
 
-    names, units: one each; mean, sd (k,): of the normal prior, sd inf for a flat one; low, high (k,): bounds. wide_sd
-    (k,): second standard deviation of a prior that is a mixture, half N(mean, sd^2) and half N(mean, wide_sd^2); NaN
-    for a plain normal prior.
+    names, units: one each.
+    mean, sd (k,): of the normal prior, in the parameter's unit; sd inf for a flat one.
+    low, high (k,): bounds.
+    wide_sd (k,): NaN for a normal prior; else the prior is the mixture of N(mean, sd^2) and N(mean, wide_sd^2) in equal
+        parts.
     """
 
     name: str
@@ -45,7 +47,7 @@ class Block:
         bounds: tuple[npt.ArrayLike, npt.ArrayLike] = (-np.inf, np.inf),
         wide_sd: npt.ArrayLike = np.nan,
     ) -> Self:
-        """Block whose numbers are given once for all parameters or one for each."""
+        """Block of parameters; each number is given once for all of them, or as (k,)."""
         names, given = tuple(names), (mean, sd, *bounds, wide_sd)
         arrays = (np.broadcast_to(np.asarray(values, dtype=float), len(names)) for values in given)
         return cls(name, names, tuple(units), *arrays)
@@ -117,7 +119,9 @@ class Parameters:
         return np.clip(values, self.low, self.high)
 
     def prior_precision(self, values: FloatArray) -> FloatArray:
-        """Precisions (p,) of the normal priors that touch the priors from above at values (p,), 0 for a flat one.
+        """Precisions (p,) of normal priors whose costs majorize those of the priors at values (p,), 0 for a flat one.
+
+        A normal prior's cost, up to a constant, is at least that of the mixture everywhere and equal to it at `values`.
 
         For a mixture of normal distributions with one mean: its components' precisions, weighted by their
         responsibilities (the expectation step of Dempster, Laird and Rubin, 1977).
@@ -126,10 +130,10 @@ class Parameters:
             result = self.sd**-2.0
         mixed = np.isfinite(self.wide_sd)
         narrow, wide = result[mixed], self.wide_sd[mixed] ** -2.0
-        # log odds of the narrow component
-        odds = 0.5 * np.log(narrow / wide) - 0.5 * (narrow - wide) * (values - self.mean)[mixed] ** 2
-        share = expit(odds)
-        result[mixed] = share * narrow + (1.0 - share) * wide
+        # of the narrow component
+        log_odds = 0.5 * np.log(narrow / wide) - 0.5 * (narrow - wide) * (values - self.mean)[mixed] ** 2
+        responsibility = expit(log_odds)
+        result[mixed] = responsibility * narrow + (1.0 - responsibility) * wide
         return result
 
     def prior_cost(self, values: FloatArray) -> float:

@@ -1,4 +1,4 @@
-"""Input of the solver: readings that a parameter vector predicts, their whitening, and the parameters' priors."""
+"""Input of the solver: readings and the model that predicts them, their whitening, and the parameters' priors."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ Whiten = Callable[[FloatArray], FloatArray]
 
 
 class Observations(Protocol):
-    """Readings of one kind or of several: each of n rows has `a` numbers in mm."""
+    """Readings y of one kind or of several and their prediction h(x): n rows of `a` numbers each, in mm."""
 
     def residual(self, values: FloatArray, /) -> FloatArray:
         """Readings minus prediction (n, a) at parameter values (p,); NaN where the model predicts nothing."""
@@ -29,7 +29,7 @@ def unweighted(values: FloatArray) -> FloatArray:
 
 
 def log_determinant(whiten: Whiten) -> float:
-    """Logarithm of the determinant of a whitening; raises FitError where it does not state it."""
+    """Logarithm of the determinant of a whitening; raises FitError for one that does not state its own."""
     log = 0.0 if whiten is unweighted else getattr(whiten, "log_determinant", None)
     if log is None:
         raise FitError("the whitening states no log_determinant; allowed: one that does, as Whitening")
@@ -44,7 +44,7 @@ class WhiteNoise:
 
     @property
     def log_determinant(self) -> float | None:
-        """Logarithm of the determinant of the map; None where one standard deviation is that of any number."""
+        """Logarithm of the determinant of the map; None for a single sd, which does not say of how many readings."""
         return -float(np.log(self.sd).sum()) if np.ndim(self.sd) else None
 
     def __call__(self, values: FloatArray) -> FloatArray:
@@ -59,9 +59,10 @@ class Problem:
 
         minimise  1/2 |W (y - h(x))|^2 - log p(x)
 
-    observations: y and h; parameters: x with priors p(x) and bounds; whiten: the linear map W that makes the errors e
-    independent with unit variance, from (n, a, ...) to (n, a, ...); loss: name of a robust loss for rows with gross
-    errors, "linear" for none, which bends at `loss_scale` standard deviations.
+    observations: y and h; parameters: x with priors p(x) and bounds.
+    whiten: the linear map W that makes the errors e independent with unit variance, (n, a, ...) to (n, a, ...).
+    loss: "linear", or a robust loss of `scipy.optimize.least_squares` for rows with gross errors, which replaces the
+        square of a row's whitened residual beyond `loss_scale`.
     """
 
     observations: Observations

@@ -6,7 +6,7 @@ from matplotlib.collections import LineCollection
 from rrru.errors import ConfigError
 from rrru.figures import choose, style
 
-# a nanometre: no difference between mean distances is smaller in earnest
+# smallest excess that is drawn, a nanometre: the log axis has no zero, and no smaller difference matters
 _FLOOR_MM = 1e-6
 
 
@@ -26,14 +26,14 @@ def convergence(tables, options):
         lacking = f"no calibration {', '.join(missing)}"
         raise ConfigError(f"convergence: table genetic of campaign {campaign!r} has {lacking}")
     figure, panels = style.panel_grid(len(names), 55.0, sharex=True, sharey=True)
-    for place, (name, axes) in enumerate(zip(names, panels[:, 0], strict=True)):
+    for index, (name, axes) in enumerate(zip(names, panels[:, 0], strict=True)):
         optimum = float(runs.loc[runs["calibration"] == name, "optimum_mm"].iloc[0])
         _panel(axes, history[history["calibration"] == name], optimum)
-        axes.set_title(f"({chr(97 + place)}) {choose.calibration_label(name)}, optimum {optimum:.4f} mm")
-        lowest = place + 2 >= len(names)
+        axes.set_title(f"({chr(97 + index)}) {choose.calibration_label(name)}, optimum {optimum:.4f} mm")
+        lowest = index + 2 >= len(names)
         axes.tick_params(labelbottom=lowest)
         axes.set_xlabel("generation" if lowest else "")
-        axes.set_ylabel("" if place % 2 else "excess over the optimum (mm)")
+        axes.set_ylabel("" if index % 2 else "excess over the optimum (mm)")
     style.legend_above(figure, panels[:, 0], columns=5 if len(names) > 1 else 2)
     return figure
 
@@ -41,18 +41,17 @@ def convergence(tables, options):
 def _panel(axes, history, optimum):
     """Every seed as a thin line, their median and quartiles; a run that has stopped keeps what it reached."""
     wide = history.pivot(index="generation", columns="seed", values="best_mm").sort_index()
-    # a log axis has no zero: a run that has reached the optimum is drawn there
     excess = (wide.where(np.isfinite(wide)).ffill() - optimum).clip(lower=_FLOOR_MM)
-    place, ends = excess.index.to_numpy(), history.groupby("seed")["generation"].max()
-    runs = [np.column_stack([place, excess[seed]])[place <= end] for seed, end in ends.items()]
+    generations, ends = excess.index.to_numpy(), history.groupby("seed")["generation"].max()
+    runs = [np.column_stack([generations, excess[seed]])[generations <= end] for seed, end in ends.items()]
     seeds = LineCollection(runs, colors=style.SKY, linewidths=0.4, zorder=1, label="one seed")
     axes.add_collection(seeds)
     last = np.array([run[-1] for run in runs])
     axes.plot(*last.T, ".", color=style.SKY, markersize=3.0, zorder=2, label="end of a run")
     low, high = excess.quantile(0.25, axis=1), excess.quantile(0.75, axis=1)
-    axes.fill_between(place, low, high, color=style.BLUE, alpha=0.25, linewidth=0.0, zorder=3, label="quartiles")
+    axes.fill_between(generations, low, high, color=style.BLUE, alpha=0.25, linewidth=0.0, zorder=3, label="quartiles")
     median = f"median of {excess.shape[1]} seeds"
-    axes.plot(place, excess.median(axis=1), color=style.BLUE, linewidth=1.4, zorder=4, label=median)
+    axes.plot(generations, excess.median(axis=1), color=style.BLUE, linewidth=1.4, zorder=4, label=median)
     # generation 0, the initial population, has its place on a log axis that is linear up to 1
     axes.set_xscale("symlog", linthresh=1.0, linscale=0.3)
     axes.set_yscale("log")

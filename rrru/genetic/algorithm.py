@@ -11,7 +11,7 @@ import numpy as np
 from rrru.errors import ConfigError, FitError
 from rrru.genetic import cma_es, operators, pygad_run
 from rrru.genetic.islands import migrate
-from rrru.genetic.plan import Box, directions, make_rules, migrants_of, mutants_of, mutation_sigma, uniforms_needed
+from rrru.genetic.plan import Bounds, directions, make_rules, migrants_of, mutants_of, mutation_sigma, uniforms_needed
 from rrru.genetic.result import GeneticResult, means
 from rrru.genetic.settings import is_number
 from rrru.kinematics.compiled import CompiledObjective
@@ -37,8 +37,8 @@ def minimise(objective, low, high, settings, seed):
         raise ConfigError(f"seed is {seed!r}; allowed: a whole number in 0..{2**32 - 1}")
     for name, other in (("pygad", pygad_run), ("cma_es", cma_es)):
         if settings.operators == name:
-            return other.run(checked(objective), Box(low, high), settings, int(seed))
-    return _Run(objective, Box(low, high), settings, np.random.default_rng(seed)).result()
+            return other.run(checked(objective), Bounds(low, high), settings, int(seed))
+    return _Run(objective, Bounds(low, high), settings, np.random.default_rng(seed)).result()
 
 
 def checked(objective):
@@ -59,13 +59,13 @@ def checked(objective):
 class _Run:
     """One run: the last generation's genes and scores, and the histories so far."""
 
-    def __init__(self, objective, box, settings, generator):
-        self.objective, self.box, self.settings, self.generator = objective, box, settings, generator
-        self.rules = make_rules(settings, looks_up=isinstance(objective, CompiledObjective))
+    def __init__(self, objective, bounds, settings, generator):
+        self.objective, self.bounds, self.settings, self.generator = objective, bounds, settings, generator
+        self.rules = make_rules(settings, reuses_scores=isinstance(objective, CompiledObjective))
         self.migrants = migrants_of(settings.populations, settings.migration_fraction)
         self.rate = checked(objective)
-        self.population = generator.random((sum(settings.populations), box.low.size))
-        self.score = self.rate(operators.decoded(self.population, box))
+        self.population = generator.random((sum(settings.populations), bounds.low.size))
+        self.score = self.rate(operators.decoded(self.population, bounds))
         self.best, self.size = np.full(int(settings.generations) + 1, np.inf), np.nan
         self.best[0], self.done, self.stopped = self.score.min(), 0, "generations"
         self.mean, self.found = [], []
@@ -95,11 +95,11 @@ class _Run:
         populations = np.empty((count + 1, *self.population.shape))
         scores = np.empty(populations.shape[:2])
         populations[0], scores[0] = self.population, self.score
-        if self.rules.looks_up:
+        if self.rules.reuses_scores:
             advance, objective = operators.advance, (self.objective.kernel, self.objective.legs, self.objective.points)
         else:
             advance, objective = operators.advance.py_func, (self._rate_into, None, None)
-        done = advance(*objective, self.box, self.rules, draws, self.done, populations, scores, self.best)
+        done = advance(*objective, self.bounds, self.rules, draws, self.done, populations, scores, self.best)
         self.done += done
         self.population, self.score, self.size = populations[done], scores[done], draws[2][done]
         self._note(populations[1 : done + 1], scores[1 : done + 1])
@@ -109,10 +109,10 @@ class _Run:
 
     def _draw(self, count):
         """Random numbers and the mutation's sizes of the next generations."""
-        settings, genes, plan = self.settings, self.box.low.size, self.rules.plan
+        settings, genes, plan = self.settings, self.bounds.low.size, self.rules.plan
         mutants = int(mutants_of(plan).sum())
         uniform = self.generator.random((count, uniforms_needed(plan, genes)))
-        if self.rules.adapts:
+        if self.rules.adaptive_mutation:
             moves = directions(self.generator, count * mutants, genes).reshape(count, mutants, 2 * genes, genes)
         else:
             moves = self.generator.standard_normal((count, mutants, 1, genes))
@@ -125,7 +125,7 @@ class _Run:
         """Keep mean objective and best individual of generations (k, n, p) with scores (k, n)."""
         self.mean.append(means(scores))
         best = populations[np.arange(len(scores)), scores.argmin(axis=1)]
-        self.found.append(operators.decoded(best, self.box))
+        self.found.append(operators.decoded(best, self.bounds))
 
     def _rate_into(self, deviations, _legs, _points, values):
         """The objective as `operators.advance` calls it."""

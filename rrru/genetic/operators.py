@@ -193,9 +193,9 @@ def look_up(children, known, population, score):
 
 
 @_compiled
-def decoded(genes, box):
+def decoded(genes, bounds):
     """Parameters of genes in 0..1; rounding must not lead beyond the upper bound."""
-    return np.minimum(box.low + genes * (box.high - box.low), box.high)
+    return np.minimum(bounds.low + genes * (bounds.high - bounds.low), bounds.high)
 
 
 @_compiled
@@ -215,10 +215,10 @@ def has_stalled(best, stall_generations, tolerance):
 
 
 @_compiled
-def advance(objective, legs, points, box, rules, draws, done, populations, scores, best):
+def advance(objective, legs, points, bounds, rules, draws, done, populations, scores, best):
     """Breed and rate as many generations as there are draws, fewer where the run stalls; returns their number.
 
-    objective: writes the values (m,) of parameters (m, p), see `rrru.kinematics.compiled`; box, rules: see `plan`;
+    objective: writes the values (m,) of parameters (m, p), see `rrru.kinematics.compiled`; bounds, rules: see `plan`;
     draws: uniform (k, u), moves (k, mutants, t, p) and their sizes (k + 1,) of each generation and of the one before;
     adaptive ones are written; done: generations before. populations (k + 1, n, p) and scores (k + 1, n) start with the
     last generation, best (all generations + 1,) is written behind `done`.
@@ -227,10 +227,10 @@ def advance(objective, legs, points, box, rules, draws, done, populations, score
     for k in range(len(uniform)):
         population, score, children, known = populations[k], scores[k], populations[k + 1], scores[k + 1]
         generation = done + k
-        if rules.adapts:
+        if rules.adaptive_mutation:
             sizes[k + 1] = adapted(sizes[k], best, generation + 1)
         next_population(population, score, rules.plan, (uniform[k], moves[k], sizes[k + 1]), children, known)
-        if rules.looks_up:
+        if rules.reuses_scores:
             look_up(children, known, population, score)
         asked, count = np.empty_like(children), 0
         for i in range(len(known)):
@@ -238,7 +238,7 @@ def advance(objective, legs, points, box, rules, draws, done, populations, score
                 asked[count] = children[i]
                 count += 1
         values = np.empty(count)
-        objective(decoded(asked[:count], box), legs, points, values)
+        objective(decoded(asked[:count], bounds), legs, points, values)
         best[generation + 1], count = np.inf, 0
         for i in range(len(known)):
             if np.isnan(known[i]):

@@ -1,4 +1,4 @@
-"""Plan of an evolution: elites, crossover children, mutants and migrants of each island (MATLAB `ga`)."""
+"""Numbers of elites, crossover children, mutants and migrants of each island, as MATLAB's `ga` has them."""
 
 import math
 from typing import NamedTuple
@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 
-class Box(NamedTuple):
+class Bounds(NamedTuple):
     """Bounds (p,) of the parameters."""
 
     low: np.ndarray
@@ -14,21 +14,23 @@ class Box(NamedTuple):
 
 
 class Rules(NamedTuple):
-    """Constants of a run: plan of the islands, stop criteria, operators of a generation.
+    """Constants of a run.
 
-    adapts: whether mutation adapts its steps; looks_up: whether a child equal to one of the last population has its
-    score.
+    plan (islands, 4): see `make_plan`.
+    stall_generations, stall_tolerance: stop criteria, as of GeneticSettings.
+    adaptive_mutation: whether mutation adapts its steps.
+    reuses_scores: whether a child equal to a member of the last population gets its score without an evaluation.
     """
 
     plan: np.ndarray
     stall_generations: int
     stall_tolerance: float
-    adapts: bool
-    looks_up: bool
+    adaptive_mutation: bool
+    reuses_scores: bool
 
 
 def elite_count(size, share):
-    """Number of elites in a population of `size` individuals: ceil(share size), float noise in the product removed."""
+    """Number of elites of `size` individuals: ceil(share size), without rounding errors of the product."""
     return math.ceil(round(share * size, 9))
 
 
@@ -45,7 +47,10 @@ def migrant_count(fraction, first_size, second_size):
 
 
 def make_plan(populations, elite_share, crossover_fraction):
-    """Plan (islands, 4) of islands of the given sizes."""
+    """Plan (islands, 4) of islands of these sizes: first individual, last one + 1, elites, children by crossover.
+
+    The rest of an island are mutants. Individuals are counted through all islands.
+    """
     rows, start = [], 0
     for size in populations:
         elites = elite_count(size, elite_share)
@@ -55,22 +60,22 @@ def make_plan(populations, elite_share, crossover_fraction):
 
 
 def uniforms_needed(plan, genes):
-    """Number of uniform random numbers that `operators.next_population` takes, of a number of genes."""
+    """Number of uniform random numbers that `operators.next_population` takes for a plan (islands, 4) and p genes."""
     crossed = plan[:, 3]
     return int((1 + 2 * crossed + mutants_of(plan) + crossed * genes).sum())
 
 
 def mutants_of(plan):
-    """Numbers of mutants (islands,)."""
+    """Numbers of mutants (islands,) of a plan (islands, 4)."""
     return plan[:, 1] - plan[:, 0] - plan[:, 2] - plan[:, 3]
 
 
 def directions(generator, count, genes):
-    """Moves (count, 2 p, p) of adaptive feasible mutation, to be tried in their order, of numbers of mutants and genes.
+    """Directions (count, 2 p, p) that the mutants of adaptive feasible mutation try in this order; genes: p.
 
-    Both senses of the columns of a lower triangular matrix with 1 or -1 on its diagonal, all in random order: each
-    mutant's moves span the space, as those of mesh adaptive direct search do (Audet and Dennis, SIAM Journal on
-    Optimization 17, 2006, "LTMADS"), from which MATLAB's adaptive mutation is taken.
+    Of each mutant both signs of the columns of a lower triangular matrix with 1 or -1 on its diagonal, coordinates and
+    columns in random order. They span the space positively, as those of mesh adaptive direct search do (Audet and
+    Dennis, SIAM Journal on Optimization 17, 2006, "LTMADS"), from which MATLAB's adaptive mutation is taken.
     """
     # ASSUME MATLAB's documentation says that "directions are adaptive with respect to the last successful or
     # unsuccessful generation" and "satisfy bounds"; the numbers are LTMADS': steps double or halve (a mesh four times
@@ -95,12 +100,12 @@ def mutation_sigma(generation, generations, scale, shrink):
     return scale * (1.0 - shrink * generation / generations)
 
 
-def make_rules(settings, looks_up):
+def make_rules(settings, reuses_scores):
     """Rules of GeneticSettings."""
     return Rules(
         make_plan(settings.populations, settings.elite_share, settings.crossover_fraction),
         int(settings.stall_generations),
         float(settings.stall_tolerance),
         settings.operators == "matlab_adaptive",
-        looks_up,
+        reuses_scores,
     )

@@ -23,13 +23,13 @@ _LOGGER.addHandler(logging.NullHandler())
 _LOGGER.propagate = False
 
 
-def run(objective, box, settings, seed):
-    """GeneticResult of an objective, see `algorithm.minimise`, within a Box.
+def run(objective, bounds, settings, seed):
+    """GeneticResult of an objective, see `algorithm.minimise`, within a Bounds.
 
     Stalled is PyGAD's "saturate": the best objective stayed the same. Raises FitError where no individual is feasible,
     and ConfigError where PyGAD is not installed.
     """
-    islands = [_Island(objective, box, settings, size, seed + k) for k, size in enumerate(settings.populations)]
+    islands = [_Island(objective, bounds, settings, size, seed + k) for k, size in enumerate(settings.populations)]
     stall, rows = settings.stall_generations, make_plan(settings.populations, settings.elite_share, 1.0)
     migrants = migrants_of(settings.populations, settings.migration_fraction)
     stretch = settings.generations if len(islands) == 1 else settings.migration_interval
@@ -42,7 +42,7 @@ def run(objective, box, settings, seed):
                 island.ga.population = arrived[start:stop]
         for island in islands:
             island.advance(min(stretch, settings.generations - done))
-        result = _joined(islands, box)
+        result = _joined(islands, bounds)
         stopped = result.stalled(stall, 0.0)
         if stopped.generations < settings.generations and stopped.stopped == "stalled":
             return stopped
@@ -62,8 +62,8 @@ def _pygad():
 class _Island:
     """One PyGAD instance and its histories, from the initial population on."""
 
-    def __init__(self, objective, box, settings, size, seed):
-        self.objective, self.box, self.asked = objective, box, 0
+    def __init__(self, objective, bounds, settings, size, seed):
+        self.objective, self.bounds, self.asked = objective, bounds, 0
         self.genes, self.scores, self.rated = [], [], []
         # the only island may stop by itself
         alone = len(settings.populations) == 1 and settings.stall_generations
@@ -74,7 +74,7 @@ class _Island:
             fitness_func=self._fitness,
             fitness_batch_size=size,
             sol_per_pop=size,
-            num_genes=box.low.size,
+            num_genes=bounds.low.size,
             init_range_low=0.0,
             init_range_high=1.0,
             parent_selection_type="sus",
@@ -109,7 +109,7 @@ class _Island:
     def _fitness(self, _ga, genes, _rows):
         """PyGAD's fitness, minus the objective, of a batch."""
         self.asked += len(genes)
-        return -self.objective(operators.decoded(np.asarray(genes, dtype=float), self.box))
+        return -self.objective(operators.decoded(np.asarray(genes, dtype=float), self.bounds))
 
     def _note(self, ga):
         """Keep a generation."""
@@ -123,14 +123,14 @@ class _Island:
         self.rated.append(self.asked)
 
 
-def _joined(islands, box):
+def _joined(islands, bounds):
     """The islands' histories as one GeneticResult."""
     scores = np.stack([np.concatenate(row) for row in zip(*(island.scores for island in islands), strict=True)])
     best = np.stack([[row.min() for row in island.scores] for island in islands])
     genes = np.stack([island.genes for island in islands])[best.argmin(axis=0), np.arange(len(scores))]
     return GeneticResult(
         stopped="generations",
-        found=operators.decoded(genes, box),
+        found=operators.decoded(genes, bounds),
         best_history=best.min(axis=0),
         mean_history=means(scores),
         asked=np.sum([island.rated for island in islands], axis=0),

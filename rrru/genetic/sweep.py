@@ -1,6 +1,6 @@
-"""Sweeps of the genetic algorithm's settings over many seeds, and tests whether their effect is significant.
+"""Sweeps of the genetic algorithm's settings over many seeds, and significance tests of the settings' effect.
 
-Every run goes to the end. The result of the same run stopped where it stalls comes from its history.
+Every run goes to its last generation. The result of the same run stopped where it stalls is read from its history.
 """
 
 from dataclasses import replace
@@ -13,10 +13,11 @@ from rrru.genetic.algorithm import minimise
 from rrru.seeds import run_seed
 
 SWEPT = ("crossover_fraction", "migration_fraction")
-# one sweep: reading of the paper, where runs stop, setting, kind of population
+# columns that identify one sweep: operators, where runs stop, swept setting, one population or islands
 SWEEP = ["operators", "stop", "parameter", "population"]
-_LEVEL = 0.05
-_RESAMPLES = 1999
+# level of significance of the tests, and one minus the confidence level of the intervals
+_SIGNIFICANCE = 0.05
+_BOOTSTRAP_RESAMPLES = 1999
 
 
 def run_sweep(objective, parameters, settings, parameter, value, seeds, study_seed=0):
@@ -48,7 +49,7 @@ def run_sweep(objective, parameters, settings, parameter, value, seeds, study_se
 
 
 def setting_effect(runs):
-    """Whether the settings' objectives differ at all: one row per SWEEP of a table of runs.
+    """Whether the values of a setting differ at all in the objective they reach: one row per SWEEP of a table of runs.
 
     Columns: those of SWEEP, settings (number of values), runs, statistic and p_value of the Kruskal-Wallis test
     over all values, epsilon_squared = H / (n - 1), the share of the rank variance that the settings explain (Tomczak
@@ -59,8 +60,8 @@ def setting_effect(runs):
     for key, group in runs.groupby(SWEEP):
         label = dict(zip(SWEEP, key, strict=True))
         # at 1.0 MATLAB's step does not mutate; PyGAD's does
-        stands_still = label["parameter"] == "crossover_fraction" and label["operators"] != "pygad"
-        mutates = group["value"] < 1.0 if stands_still else np.full(len(group), True)
+        can_lack_mutation = label["parameter"] == "crossover_fraction" and label["operators"] != "pygad"
+        mutates = group["value"] < 1.0 if can_lack_mutation else np.full(len(group), True)
         every = _kruskal(group)
         mutating = every if mutates.all() else _kruskal(group[mutates])
         rows.append(
@@ -68,7 +69,7 @@ def setting_effect(runs):
             | {"settings": group["value"].nunique(), "runs": len(group)}
             | every
             | {f"{name}_mutating": value for name, value in mutating.items()}
-            | {"distinguishable_mutating": mutating["p_value"] < _LEVEL}
+            | {"distinguishable_mutating": mutating["p_value"] < _SIGNIFICANCE}
         )
     return pd.DataFrame(rows)
 
@@ -79,8 +80,8 @@ def setting_pairs(runs, seed=0):
     Columns: those of SWEEP, value, best_value (lowest median objective), median_mm, difference_mm (of the
     medians, value minus best) with its 95 % percentile-bootstrap interval difference_low_mm, difference_high_mm (NaN
     with a single run or infeasible ones), p_value (Mann-Whitney, two-sided), p_holm (corrected over the values of the
-    group), distinguishable (p_holm below 5 %). The best value was picked from the same runs, which makes the
-    differences look somewhat too large. `seed` is of the bootstrap.
+    group), distinguishable (p_holm below 5 %). The best value is chosen from the same runs, which biases the
+    differences upwards. seed: of the bootstrap.
     """
     from scipy import stats
 
@@ -97,7 +98,7 @@ def setting_pairs(runs, seed=0):
                 difference = _median_difference(sample, samples[best], pair_seed)
                 pairs.append(label | {"median_mm": float(np.median(sample))} | difference | test)
         for pair, corrected in zip(pairs, _holm([pair["p_value"] for pair in pairs]), strict=True):
-            rows.append(pair | {"p_holm": corrected, "distinguishable": corrected < _LEVEL})
+            rows.append(pair | {"p_holm": corrected, "distinguishable": corrected < _SIGNIFICANCE})
     return pd.DataFrame(rows)
 
 
@@ -126,8 +127,8 @@ def _median_difference(sample, reference, seed):
     interval = stats.bootstrap(
         (sample, reference),
         lambda a, b, axis=-1: np.median(a, axis=axis) - np.median(b, axis=axis),
-        n_resamples=_RESAMPLES,
-        confidence_level=1.0 - _LEVEL,
+        n_resamples=_BOOTSTRAP_RESAMPLES,
+        confidence_level=1.0 - _SIGNIFICANCE,
         method="percentile",
         vectorized=True,
         rng=np.random.default_rng(seed),
@@ -136,7 +137,7 @@ def _median_difference(sample, reference, seed):
 
 
 def _holm(p_values):
-    """P values corrected for their number (S. Holm 1979), in the order given; SciPy offers Benjamini-Hochberg only."""
+    """P values adjusted by Holm's step-down method (S. Holm 1979), in the order given; SciPy does not have it."""
     corrected, floor = [0.0] * len(p_values), 0.0
     for rank, index in enumerate(np.argsort(p_values, kind="stable")):
         floor = max(floor, min(1.0, (len(p_values) - rank) * p_values[index]))

@@ -1,4 +1,4 @@
-"""Objectives that compiled code can call: what a mechanism offers where a Python callable would be too slow."""
+"""Objectives that compiled code can call, for the genetic algorithm, where a Python callable would be too slow."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -12,7 +12,8 @@ from numba.extending import intrinsic
 
 from rrru.arrays import FloatArray
 
-# a kernel writes the values (m,) of deviations (m, p); legs (3, k, 1 + p) and points (rows, n) are the robot's own
+# arguments of a kernel: deviations (m, p) of m candidates, two arrays of the robot's own, legs (3, k, 1 + p) and points
+# (rows, n), and the values (m,) that it writes
 SIGNATURE = types.void(types.float64[:, ::1], types.float64[:, :, ::1], types.float64[:, ::1], types.float64[::1])
 
 
@@ -37,24 +38,24 @@ class Kernel(types.WrapperAddressProtocol):
 
 @dataclass(frozen=True)
 class CompiledObjective:
-    """A Kernel and the arrays that it is given; callable from Python."""
+    """A Kernel with the two arrays of its robot, see SIGNATURE; callable from Python, too."""
 
     kernel: Kernel
     legs: FloatArray
     points: FloatArray
 
     def __call__(self, deviations: FloatArray) -> FloatArray:
-        """Values (m,) of deviations (m, p); inf where a point leaves the reach."""
+        """Values (m,) of deviations (m, p); inf where a point is out of reach."""
         values = np.empty(len(deviations))
         self.kernel.function(np.ascontiguousarray(deviations, dtype=float), self.legs, self.points, values)
         return values
 
 
 def _fma(_typing: Any, _a: Any, _b: Any, _c: Any) -> tuple[Any, Callable[..., Any]]:
-    """The sum a b + c rounded once, said explicitly: what a compiler may fuse depends on what it has inlined."""
+    """Fused multiply-add a b + c, rounded once. It is explicit, as what a compiler fuses depends on what it inlines."""
     number = types.float64
     return number(number, number, number), lambda _context, builder, _signature, values: builder.fma(*values)
 
 
-# compiled code, which alone calls it, gives it the three numbers without the compiler's own first argument
+# compiled code alone calls it, with three numbers: numba adds the typing context
 fma = cast(Callable[[float, float, float], float], intrinsic(_fma))

@@ -144,9 +144,11 @@ def drive_step(
 ) -> tuple[FloatArray, FloatArray, BoolArray]:
     """Changes (n, K) of the actuator values that remove errors of position (n, 3) and, if possible, of orientation.
 
-    error_rad (n, 3): rotation vectors from the present orientations to the goal's; ranks: degrees of freedom of the point's position and, in addition, of the platform's orientation by the drives; widths (K,): of the drives' ranges, which scale the changes; the smallest scaled changes are returned. Returns also
-    the size (n,) in rad of the remaining change of orientation that is possible, and whether (n,) a pose lacks a degree
-    of freedom. The orientation is corrected in the null space of the position (Siciliano et al., 2009, section 3.5).
+    error_rad (n, 3): rotation vectors from the present orientations to the goal's; ranks: degrees of freedom of the
+    point's position and, in addition, of the platform's orientation by the drives; widths (K,): of the drives' ranges,
+    which scale the changes; the smallest scaled changes are returned. Returns also the size (n,) in rad of the
+    remaining change of orientation that is possible, and whether (n,) a pose lacks a degree of freedom. The orientation
+    is corrected in the null space of the position (Siciliano et al., 2009, section 3.5).
     """
     response, turn = at.drive_response * widths, at.platform[:, 3:] @ at.drive_counts * widths
     reach, singular = _inverse_of_rank(response, ranks[0], response)

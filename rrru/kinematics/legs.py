@@ -1,14 +1,15 @@
-"""A robot as legs of screws: the description of every robot and the input of the general model.
+"""A robot as legs, chains of joints: the description of every robot and the input of the general model.
 
 A platform is held by legs. A leg is a chain of joints from the base to the platform; each joint is preceded by a fixed
 placement, the link. Universal and ball joints are revolute ones at one place. A leg may end in a bar instead, a link or
 cable between two ball joints, which only holds its length. Joints of one name, with all that precedes them, are shared
 by legs: the two bars of a Delta's arm share its drive, and chains may part behind a passive joint. Arms on one trunk
-are legs with separate ends: each has an end effector of its own, see `rrru.kinematics.end_effectors`.
+are legs that hold no common platform: each has an end effector of its own, see `rrru.kinematics.end_effectors`.
 
-Every small geometric error is a twist at a site. Sites are every joint's seat, every bar and its end at the platform,
-the world (the frame of the measurements), the tool (the measured point) and every reflector on it. Each site has its
-own frame, tool and reflectors that of the platform. Lengths in mm, angles in rad.
+Every small geometric error is a twist (6,) at a site: a shift in mm along the axes of the site's frame, then a rotation
+vector in rad. Sites are the frame of every joint, every bar and its end at the platform, the world (the frame of the
+measurements), the tool (the measured point) and every reflector on it. The frame of tool and reflectors is the
+platform's. Lengths in mm, angles in rad.
 """
 
 from dataclasses import dataclass, field, replace
@@ -30,9 +31,10 @@ _NO_SHIFT, _NO_TURN = np.zeros(3), np.eye(3)
 class Joint:
     """One joint and the link before it.
 
-    kind: "R" turns about, "P" slides along `axis` (3,), "fixed" only makes a site; shift_mm (3,) and turn (3, 3): its
-    frame in the frame behind the joint before it; drive: the number of its driven value, see `Legs`, counted from 0,
-    None for a passive joint; home: value of a passive joint from which searches start.
+    kind: "R" turns about, "P" slides along `axis` (3,), a unit vector; "fixed" only makes a site.
+    shift_mm (3,), turn (3, 3): position and rotation matrix of its frame in the moved frame of the joint before it.
+    drive: number of its driven value from 0, see `Legs`; None for a passive joint.
+    home: value in rad or mm of a passive joint from which searches start.
     """
 
     name: str
@@ -103,10 +105,12 @@ class Chain(NamedTuple):
 class Legs:
     """All legs of a robot, and the sites and values that they make.
 
-    home_drives (K,), home_mm (3,), home_turn (3, 3): actuator values and pose in the middle of the workspace;
-    reflectors: names of the sites of reflectors that the tool carries, none where the tool itself is measured; coupling
-    (D, K): driven values of joints and bars per actuator value, where some follow others; None where they are the same;
-    hands: of legs with separate end effectors the names of the targets on each, empty where all hold one platform.
+    home_drives (K,), home_mm (3,), home_turn (3, 3): actuator values and the platform's pose at home, in the middle of
+        the workspace.
+    reflectors: names of the sites of reflectors that the tool carries, none where the tool itself is measured.
+    coupling (D, K): driven values of joints and bars per actuator value, where some joints follow others; None where
+        driven values are the actuator values.
+    end_effectors: names of the targets on each end effector; empty where all legs hold one platform.
     """
 
     legs: tuple[Leg, ...]
@@ -130,7 +134,7 @@ class Legs:
 
     @property
     def arm_joints(self) -> tuple[str, ...]:
-        """Names of the turning joints of an arm (one leg without a bar) or of arms with separate ends; else none."""
+        """Names of the turning joints of an arm (one leg without a bar) or of several arms; else none."""
         if (len(self.legs) > 1 and not self.end_effectors) or self.legs[0].bar:
             return ()
         return tuple(joint.name for joint in self.joints if joint.kind == "R")
@@ -183,7 +187,7 @@ class Legs:
 
     @cached_property
     def groups(self) -> tuple[tuple[int, ...], ...]:
-        """Numbers of the legs of each group: legs that share passive joints; all legs if they have separate ends."""
+        """Numbers of the legs of each group: legs that share passive joints, or all legs of several end effectors."""
         if self.end_effectors:
             return (tuple(range(len(self.legs))),)
         result: list[list[int]] = []
@@ -219,13 +223,13 @@ class Legs:
 
     @property
     def parallel(self) -> bool:
-        """Whether every drive has a leg of its own, unlike those of arms."""
+        """Whether there are as many legs as driven values: a parallel robot, no arm."""
         return len(self.legs) >= len(self.driven_kinds)
 
     def longest_mm(self, first: int, travel: FloatArray) -> float:
-        """Length of the longest leg from its joint of this number on, to the platform's frame.
+        """Upper bound in mm of the length of the legs from their joints of this number on to the platform's frame.
 
-        With its slides and its bar out as far as they go; travel (K,): the largest size of each actuator value.
+        Slides and bars are out as far as they go. travel (K,): largest absolute value of each actuator.
         """
         far = travel if self.coupling is None else np.abs(self.coupling) @ travel
         return float(max(self._length_mm(leg, first, far) for leg in self.legs))
@@ -249,8 +253,8 @@ class Legs:
 class Drive:
     """One actuator value: its column in tables, its unit ("rad", "mm"), and what it moves.
 
-    site, twist (6,): a change of the value acts as this twist per unit at this site; others: and as these twists by
-    site, where more joints follow it.
+    site, twist (6,): a change of the value acts as this twist per unit at this site.
+    others: twists (6,) per unit by site of further joints that follow it.
     """
 
     column: str
@@ -269,10 +273,13 @@ class Drive:
 class Parts:
     """Which sites of a robot the effects act on, by legs or drives, from the first to the last.
 
-    drives: of every actuator value; feet: sites at which the legs stand on the base, x outwards and y to the side;
-    links: name of a length to the sites whose x lies along it, several for a leg of several bars; members: the links
-    that push the platform, likewise; held_from: sites from which a leg pushes whose inner joint friction holds;
-    followers: joints that follow drives and have none of their own, described as Drives.
+    drives: of every actuator value.
+    feet: sites at which the legs stand on the base, x outwards and y to the side.
+    links: by name of a length, by leg the sites whose x axis is along it, several for a leg of several bars.
+    members: by leg the sites of the links that push the platform.
+    held_from: by leg the site from which the leg acts as one two-force member while friction holds its inner joint;
+        empty where no joint can be held.
+    followers: joints that follow drives and have no actuator of their own, described as Drives.
     """
 
     drives: tuple[Drive, ...]
@@ -307,7 +314,7 @@ def rigid_motions(place_mm: FloatArray) -> FloatArray:
 
 
 def cross(first: FloatArray, second: FloatArray) -> FloatArray:
-    """Cross products (.., 3) of vectors (.., 3): `np.cross` takes longer to look at them than to multiply."""
+    """Cross products (.., 3) of vectors (.., 3); `np.cross` is slower for few vectors, by its checks of the shapes."""
     result = np.empty(np.broadcast_shapes(np.shape(first), np.shape(second)))
     for k in range(3):
         i, j = (k + 1) % 3, (k + 2) % 3

@@ -219,7 +219,7 @@ class TwistMap:
         return np.stack([np.einsum("nr,nri->ni", force[:, rows], one) for _, _, one, rows in self._legs])
 
     def translational_measure(self, lengths_mm: FloatArray) -> FloatArray:
-        """Smallest singular value (n,) of the position Jacobian over its largest; 0 where it moves in no direction.
+        """Smallest singular value (n,) of the position Jacobian over its largest; 0 where some direction is lost.
 
         lengths_mm (K,): by which each drive's value is multiplied to be comparable: the characteristic length of drives
         that turn, 1 of those that slide (Angeles, Fundamentals of Robotic Mechanical Systems, section 5.8).
@@ -230,7 +230,8 @@ class TwistMap:
     def constraint_measures(self, characteristic_length_mm: float) -> tuple[FloatArray, FloatArray]:
         """Smallest singular value and determinant (n,) of the legs' wrenches about the point, orthonormal by group.
 
-        Moments count at an arm in mm. The determinant has a sign where every leg is a bar; it is positive elsewhere.
+        Moments are divided by the characteristic length. The determinant has a sign where every leg is a bar; it is
+        positive elsewhere.
         """
         groups = by_group(self.closure.legs, self._wrenches)
         legs = [

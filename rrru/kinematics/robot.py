@@ -1,6 +1,7 @@
-"""Interface of every robot for calibration, plant and diagnosis, by the general model. Lengths in mm, angles in rad.
+"""Interface of every robot for calibration, simulation and diagnosis. Lengths in mm, angles in rad.
 
-A robot's class adds its legs, parts and parameters, and closed forms of these methods where they are faster.
+The methods here use the general model of the legs. A robot's class adds its legs, parts and parameters, and closed
+forms of these methods where they are faster.
 """
 
 from abc import ABC, abstractmethod
@@ -53,15 +54,15 @@ class Robot(ABC):
     up: tuple[float, float, float] = (0.0, 0.0, 1.0)
     up_stated: bool = True
     tool_mm: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    # largest loads in N mm or N, and rates in rad/s or mm/s, of the drives (K,) by its file, NaN for a drive without
-    # one; None where it states none
+    # largest loads (K,) of the drives in N mm or N, and largest rates (K,) in rad/s or mm/s, as the robot's file states
+    # them: NaN for a drive without one, None where the file has none
     effort_limits: FloatArray | None = None
     velocity_limits: FloatArray | None = None
-    # of its links
+    # masses of its links
     point_masses: tuple[PointMass, ...] = ()
     # what a campaign measures in addition to the tool's position, and what is unknown about it
     measurement_config: MeasurementConfig = MeasurementConfig()
-    # whether positions and their slopes are found without poses
+    # whether positions and their derivatives have closed forms, which need no solution of the closure
     closed_form = False
 
     if TYPE_CHECKING:
@@ -89,7 +90,7 @@ class Robot(ABC):
 
         @property
         def farthest_mm(self) -> float:
-            """That of the farthest reachable point, or size_mm."""
+            """Distance of the farthest reachable point from the origin, or size_mm."""
 
         @property
         def degrees_of_freedom(self) -> tuple[int, int]:
@@ -114,16 +115,16 @@ class Robot(ABC):
 
     @abstractmethod
     def identifiable(self, values: dict[str, float]) -> dict[str, float]:
-        """Mapping of the parameters from values of any of its deviations by name."""
+        """Values by name of `parameters`, from values by name of any of `deviation_names`, identifiable or not."""
 
     @property
     def orients(self) -> bool:
-        """Whether its drives can orient its platform besides moving it; not those of most robots."""
+        """Whether its drives can orient its platform in addition to moving it; not those of most robots."""
         return False
 
     @property
     def workspace_lines(self) -> int:
-        """Grid lines over its longest reach in a picture of its workspace."""
+        """Steps of the table `workspace` over the robot's reach."""
         return 130
 
     @property
@@ -150,7 +151,7 @@ class Robot(ABC):
         return Closure(self.legs)
 
     def with_measurement_config(self, config: MeasurementConfig) -> "Robot":
-        """The robot for a campaign with unknowns besides its own parameters, see `MeasurementConfig`."""
+        """The robot for a campaign with unknowns in addition to its own parameters, see `MeasurementConfig`."""
         from rrru.kinematics.augmented_robot import AugmentedRobot
 
         return AugmentedRobot(self, config) if config.reflectors or config.turned or config.frame else self
@@ -162,18 +163,18 @@ class Robot(ABC):
         return self
 
     def widened(self, angle_rad: float, length_mm: float) -> Self:
-        """The robot with other bounds of its parameters."""
+        """The robot with bounds of its angles and lengths of this size to both sides."""
         # every robot is a dataclass that has these fields, this class is none
         return replace(self, angle_limit_rad=angle_rad, length_limit_mm=length_mm)  # type: ignore[type-var]
 
     @property
     def seats(self) -> tuple[str, ...]:
-        """Sites of the axes that a manufacturer may have set wrongly: those of all joints that move."""
+        """Sites of all joints that move, whose axes may be off by their assembly."""
         return tuple(joint.name for joint in self.legs.joints if joint.kind != "fixed")
 
     @property
     def stages(self) -> tuple[BoolArray, ...]:
-        """Which parameters (p,) a search finds first where the nominal robot is far off, in turn."""
+        """Sets of parameters (p,), fitted one after the other where the nominal robot is too far off for one search."""
         return ()
 
     @property
@@ -182,7 +183,7 @@ class Robot(ABC):
         return {}
 
     def confounded_outside(self, name: str) -> tuple[tuple[Candidate, float], ...]:
-        """Candidates outside the robot that a parameter is confounded with, and its size for a unit of each.
+        """Candidates of frame, tool or reflectors that a parameter is confounded with, and its size for a unit of each.
 
         Empty for a fixed set.
         """
@@ -199,7 +200,7 @@ class Robot(ABC):
         return self.parameters.names
 
     def twists_of(self, values: Mapping[str, float]) -> FloatArray:
-        """Twists (1, sites, 6) of deviations by name."""
+        """Twists (1, sites, 6) of deviations by name, identifiable or not."""
         return self.twists(self.parameters.vector(values))
 
     def twists(self, deviations: npt.ArrayLike | None = None) -> FloatArray:
@@ -209,7 +210,7 @@ class Robot(ABC):
         return np.asarray((self.directions @ np.asarray(deviations, dtype=float))[None])
 
     def near(self, position_mm: FloatArray, actuators: FloatArray) -> PoseGuess:
-        """Poses near which the legs close at positions (n, 3) and actuator values (n, K): an upright platform's."""
+        """Start of the closure at positions (n, 3) and actuator values (n, K): the platform oriented as at home."""
         n = len(position_mm)
         turn = np.broadcast_to(self.legs.home_turn, (n, 3, 3))
         centre = np.asarray(position_mm, dtype=float) - self.legs.home_turn @ np.asarray(self.tool_mm)
@@ -224,7 +225,7 @@ class Robot(ABC):
         return self.model.solve(actuators, self.near(position_mm, actuators), twists)
 
     def measured(self, poses: Poses, twists: FloatArray, readings: Readings | None = None) -> FloatArray:
-        """Positions (n, 3) in the world's frame at Poses, under the twists (n or 1, sites, 6) of both.
+        """Positions (n, 3) in the world's frame at Poses that fit twists (n or 1, sites, 6).
 
         Of the tool, or of the reflectors of `rrru.kinematics.readings.Readings`.
         """
@@ -345,7 +346,7 @@ class Robot(ABC):
         return 0.0
 
     def drive_errors(self, twists: FloatArray) -> FloatArray:
-        """Changes (n, K) of the actuator values in twists (n, sites, 6), by least squares."""
+        """Changes (n, K) of the actuator values that come closest to twists (n, sites, 6), by least squares."""
         numbers = self.legs.site_numbers
         units = np.zeros((len(self.parts.drives), len(numbers), 6))
         for unit, drive in zip(units, self.parts.drives, strict=True):
@@ -355,7 +356,10 @@ class Robot(ABC):
         return np.asarray(np.linalg.solve(flat @ flat.T, flat @ twists.reshape(len(twists), -1).T).T, dtype=float)
 
     def unreached(self, values: FloatArray, as_home: bool = True) -> str:
-        """Why a point whose actuator values (K,) are NaN in part cannot be reached, for a message."""
+        """Why a point whose actuator values (K,) are NaN in part cannot be reached, for a message.
+
+        as_home: whether the platform was to be oriented as at home, which robots say that can orient it.
+        """
         return "out of reach of leg " + ", ".join(str(leg + 1) for leg in np.flatnonzero(np.isnan(values)))
 
     def require_reachable(self, position_mm: FloatArray, deviations: FloatArray | None = None) -> FloatArray:
@@ -372,7 +376,7 @@ class Robot(ABC):
 
 
 def into_frame(position_mm: FloatArray, frame: FloatArray) -> FloatArray:
-    """Positions (n, 3) carried by frames (n or 1, 6): shift in mm and rotation vector in rad."""
+    """Positions (n, 3) rotated and then shifted by twists (n or 1, 6): shift in mm and rotation vector in rad."""
     if not np.any(frame):
         return position_mm
     return turned_by(frame[:, 3:], position_mm) + frame[:, :3]

@@ -1,4 +1,7 @@
-"""Keys of a campaign's section as options of the command `rrru`: remedies for a user who came by the command."""
+"""Keys of a campaign's section of the configuration, written as options of the command `rrru`.
+
+Messages name keys of the configuration; users of the command get the options that set them.
+"""
 
 import re
 import shlex
@@ -8,10 +11,12 @@ from typing import Any
 
 import yaml
 
-# options of their own; every other key is stated by --set
+# keys that have an option of their own; every other key is set by --set
 _OPTIONS = {"frame": "--frame", "noise_mm": "--noise", "noise_rad": "--noise-rad"}
-_OF_ROBOT = {"tip": "--tip", "base": "--base", "platform": "--platform"}
-_PLACES = {"tool_mm": "--tool", "up": "--up"}
+# keys of a `robots:` entry: names, and places of three numbers
+_ROBOT_NAMES = {"tip": "--tip", "base": "--base", "platform": "--platform"}
+_ROBOT_VECTORS = {"tool_mm": "--tool", "up": "--up"}
+# keys that messages propose
 _KEYS = (
     "frame",
     "unit",
@@ -24,7 +29,7 @@ _KEYS = (
     "time_format",
     "targets",
 )
-# such a key in a message, with its value as YAML writes it in a line
+# one of _KEYS in a message, with its value as YAML writes it in a line
 _STATED = re.compile(rf"\b({'|'.join(_KEYS)}): (\{{[^{{}}]*\}}|\[[^\[\]]*\]|[\w.]+)")
 
 
@@ -48,21 +53,21 @@ def options_in(message: str) -> list[str]:
     >>> options_in("far off; allowed: frame: register turns another frame in")
     ['--frame register']
     """
-    found = (f"{key}={value}" for key, value in _STATED.findall(message))
-    stated = dict.fromkeys(found)
-    return [as_option(*one.split("=", 1)) for one in stated]
+    return [as_option(key, value) for key, value in dict.fromkeys(_STATED.findall(message))]
 
 
 def as_command(section: Mapping[str, Any], entry: Mapping[str, Any]) -> str:
     """The command that diagnoses a campaign's section, "" where it has no options for the robot's entry."""
+    if {"dh", "module"} & set(entry):
+        return ""
     file = entry.get("urdf") or entry.get("mjcf")
     robot = [f"--robot {shlex.quote(str(file or section['robot']))}"]
     if file:
-        if set(entry) - {"urdf", "mjcf", *_PLACES, *_OF_ROBOT}:
+        if set(entry) - {"urdf", "mjcf", *_ROBOT_VECTORS, *_ROBOT_NAMES}:
             return ""
-        robot += [f"{option} {shlex.quote(entry[key])}" for key, option in _OF_ROBOT.items() if key in entry]
-        places = {option: entry[key] for key, option in _PLACES.items() if key in entry}
-        robot += [f"{option} {','.join(f'{size:g}' for size in place)}" for option, place in places.items()]
+        robot += [f"{option} {shlex.quote(entry[key])}" for key, option in _ROBOT_NAMES.items() if key in entry]
+        vectors = {option: entry[key] for key, option in _ROBOT_VECTORS.items() if key in entry}
+        robot += [f"{option} {','.join(f'{number:g}' for number in vector)}" for option, vector in vectors.items()]
     keys = [as_option(key, value) for key, value in section.items() if key not in ("robot", "ingest")]
     return " ".join(["rrru diagnose", shlex.quote(str(section["ingest"])), *robot, *keys])
 

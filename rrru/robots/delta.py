@@ -30,8 +30,7 @@ from rrru.kinematics.chain import Poses
 from rrru.kinematics.dynamics import Masses, arm_load
 from rrru.kinematics.legs import Joint, Leg, Legs, Parts, X, Y, Z, turn_about
 from rrru.kinematics.point_masses import DriveMotion
-from rrru.parameters import LEGS
-from rrru.robots.three_legs import Deviation, of_each, of_each_leg, of_three_legs, points, three_drives
+from rrru.robots.three_legs import LEGS, Deviation, of_each, of_each_leg, of_three_legs, points, three_drives
 from rrru.robots.tripod import BARS, Tripod, pair_of_bars
 
 # columns of the legs' numbers: offset of the drive's angle, l1, l2, a

@@ -23,10 +23,9 @@ from rrru.kinematics.compiled import CompiledObjective
 from rrru.kinematics.dynamics import Masses, arm_load
 from rrru.kinematics.legs import Joint, Leg, Legs, Parts, X, Y, Z, turn_about
 from rrru.kinematics.point_masses import DriveMotion
-from rrru.parameters import LEGS
 from rrru.robots import rrru3_kernels as kernels
 from rrru.robots import rrru3_objective
-from rrru.robots.three_legs import Deviation, ThreeLegs, of_each, of_each_leg, of_three_legs, points, three_drives
+from rrru.robots.three_legs import LEGS, Deviation, ThreeLegs, of_each, of_each_leg, of_three_legs, points, three_drives
 
 ELBOW_SIGN = {"out": -1.0, "in": 1.0}
 _LINKS, _SEATS = (1, 2, 3), ("foot", "elbow", "knee", "wrist", "cross", "platform")

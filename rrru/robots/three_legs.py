@@ -17,7 +17,10 @@ from rrru.errors import ConfigError
 from rrru.kinematics import singularity, workspace
 from rrru.kinematics.legs import Drive, unit_twist
 from rrru.kinematics.robot import Robot
-from rrru.parameters import LEGS, Parameter, ParameterSet
+from rrru.parameters import Parameter, ParameterSet
+
+# numbers of the legs
+LEGS = (1, 2, 3)
 
 
 @dataclass(frozen=True)

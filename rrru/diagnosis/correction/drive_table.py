@@ -44,7 +44,7 @@ def corrected_drives(inference: InferenceResult, masses: Masses) -> pd.DataFrame
         for _ in range(OPTIONS.correction_iterations):
             motion = at_rest(robot, masses, (position, corrected, payload, end_s), approach, nominal)
             twists = robot.twists(inference.state.deviations) + effect_twists(inference, motion)
-            corrected = inverse_kinematics(robot, (position, turn), (nominal.copy(), position), twists)
+            corrected = inverse_kinematics(robot, (position, turn), (nominal, position), twists)
         found[approach] = corrected
     if np.nanmax(np.abs(found[1] - found[-1]), initial=0.0) < OPTIONS.min_sense_difference:
         found = {0: found[1]}

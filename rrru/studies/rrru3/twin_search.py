@@ -21,9 +21,9 @@ from rrru.campaign.speed_profile import Trapezoid
 from rrru.errors import ConfigError, FitError, UnreachableError
 from rrru.kinematics.dynamics import gravity
 from rrru.kinematics.legs import rigid_motions
-from rrru.parameters import LEGS
 from rrru.robots.rrru3 import Rrru3
 from rrru.robots.rrru3_kernels import forward
+from rrru.robots.three_legs import LEGS
 from rrru.simulation.driven import non_repeatability
 from rrru.studies.rrru3 import study_numbers as numbers
 from rrru.studies.rrru3 import twin_kernels as kernels
