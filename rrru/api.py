@@ -511,8 +511,8 @@ def diagnose(
 
     effects: names of the effects that may act, "all" by default; own_effects: `module:object` of the user's own, see
     docs/own-effect.md; known: effect to known values of its parameters, such as a gear ratio; seed: of the resampling
-    for intervals. progress: True for a bar of tqdm, or a function that is called with the name of each step, its number
-    and their count as it begins.
+    for intervals. progress: True for a bar of tqdm, or a function that is called at the beginning of each step with its
+    name, its number from 0 and the number of steps.
 
     Raises FitError where the readings do not determine the calibration with some 20 to spare, and ConfigError for an
     unknown effect.

@@ -24,11 +24,12 @@ campaign               str    name of the campaign in the configuration
 
 ## measurements | campaigns/{campaign}/measurements.parquet | run point
 One row per commanded point: the command and the reading of the instrument. After the commanded position follow the
-robot's own columns of commanded actuator values, here those of the 3-RRRU. Where orientations were measured there are
-command_rx_rad and measured_rx_rad (rotation vectors, null where none was), where reflectors were target, its name, and
-target_x_mm, its nominal place on the platform, or in the robot's frame where target_on says that it is fixed to the
-world. Where the file has them there are noise_x_mm, the reading's standard deviation, and temperature_c. Where the
-configuration states how the robot moved there are motion and motion_between.
+robot's own columns of commanded actuator values, here those of the 3-RRRU. Where orientations were measured, there are
+command_rx_rad and measured_rx_rad (rotation vectors, null where none was measured). Where reflectors were measured,
+there are target, the reflector's name, and target_x_mm, its nominal place on the platform, or in the robot's frame
+where target_on says that it is fixed to the world. Where the file has them, there are noise_x_mm, the reading's
+standard deviation, and temperature_c. Where the configuration states how the robot moved, there are motion and
+motion_between.
 --
 run trajectory point time_s command_{xyz}_mm
 theta1_rad             float  commanded drive angle of leg 1; 3-PTT: slider1_mm
@@ -43,7 +44,8 @@ run                    int    as in measurements
 trajectory             str    as in measurements
 point                  int    as in measurements
 true_{xyz}_mm          float? true position, non-repeatability included; null where the chains do not close
-platform_rotation_rad  float? the platform's turn; null where the chains do not close
+platform_rotation_rad  float? angle in space by which the platform is turned from its nominal orientation; null where
+    the chains do not close
 
 ## singularity | tables/singularity.parquet | campaign run point
 Distance of every commanded point from both kinds of singularity (smallest singular value of three unit rows: 0 at it,
@@ -56,13 +58,14 @@ point                  int    as in measurements
 translational_measure  float  0 where the platform can move with locked drives; of own robots the smallest over the
     largest singular value of the position Jacobian, angles times the characteristic length: 0 where the drives cannot
     move the point in some direction
-constraint_measure     float  0 where the platform can turn with locked drives; eq. (8) does not see it
+constraint_measure     float  0 at a constraint singularity, where the platform can move with locked drives: a 3-RRRU
+    can turn there. The translational measure does not show it
 constraint_determinant float  changes its sign across a constraint singularity; positive for own robots of chains
 status                 str    as in measurements {ok, outlier, stale, near_singularity, unsolved, held_out}
 
 ## workspace | campaigns/{campaign}/workspace.parquet | slice x_mm y_mm z_mm
 Regular grid over two slices of the workspace: xz at y = 0, xy through the middle of the commanded points;
-xz through that middle, too, where the robot reaches nothing at y = 0. None of robots that orient their tool: what
+where the robot reaches nothing at y = 0, also xz through that middle. No rows for robots that orient their tool: what
 they reach depends on its orientation.
 --
 campaign
@@ -70,7 +73,7 @@ slice                  str    plane {xz, xy}
 x_mm                   float  grid point, x, robot frame
 y_mm                   float  grid point, y, robot frame
 z_mm                   float  grid point, z, robot frame
-reachable              bool   true where all three legs reach
+reachable              bool   true where the robot reaches the point
 translational_measure  float? as in singularity; null out of reach
 constraint_measure     float? as in singularity; null out of reach
 constraint_determinant float? as in singularity; null out of reach
@@ -120,39 +123,40 @@ notes                  str    what was computed or missing on ingest; empty wher
 """)
 
 
-# columns of `measurements` that a campaign has where more than the tool's position was read, and after which they stand
-_MORE = (
+# columns of `measurements`, by axis, that a campaign has where more than the tool's position was read: the column that
+# they follow, their name and their description
+_BY_AXIS = (
     ("command_z_mm", "command_r{}_rad", "commanded orientation, rotation vector, robot frame"),
-    (
-        "measured_z_mm",
-        "measured_r{}_rad",
-        "measured orientation, rotation vector, robot frame",
-    ),
+    ("measured_z_mm", "measured_r{}_rad", "measured orientation, rotation vector, robot frame"),
     ("measured_z_mm", "noise_{}_mm", "standard deviation of the reading along the instrument's axis"),
     ("measured_z_mm", "target_{}_mm", "nominal place of the reflector on the platform"),
+)
+# further such columns, which follow measured_z_mm
+_BY_ROW = (
+    Column("temperature_c", "float64", "temperature of the robot, degrees Celsius", True),
+    Column("target", "str", "name of the reflector that was measured"),
+    Column("target_on", "str", "what the reflector is fixed to", False, (ON_PLATFORM, ON_WORLD)),
+    Column("motion", "str", "how the robot moved between the rows", False, KINDS),
+    Column("motion_between", "str", "what is straight from stop to stop", False, BETWEEN),
 )
 
 
 def measurement_table(robot: Robot, names: Container[str] = ()) -> Table:
-    """The table `measurements` with a robot's own columns of actuator values, and those of `names` beyond them."""
+    """The table `measurements` of a robot: with its own columns of actuator values in place of those of the 3-RRRU.
+
+    names: of the optional columns that it has in addition.
+    """
     table = next(table for table in TABLES if table.name == "measurements")
     first, last = table.names.index("theta1_rad"), table.names.index("theta3_rad") + 1
     drives = robot.parts.drives
     values = [Column(drive.column, "float64", f"commanded actuator value {drive.column}") for drive in drives]
     columns = [*table.columns[:first], *values, *table.columns[last:]]
-    more: dict[str, list[Column]] = {after: [] for after, *_ in _MORE}
-    for after, name, text in _MORE:
+    optional: dict[str, list[Column]] = {after: [] for after, *_ in _BY_AXIS}
+    for after, name, text in _BY_AXIS:
         nullable = not name.startswith("target")
-        more[after] += [Column(name.format(axis), "float64", f"{text}, {axis}", nullable) for axis in "xyz"]
-    more["measured_z_mm"].append(Column("temperature_c", "float64", "temperature of the robot, degrees Celsius", True))
-    more["measured_z_mm"].append(Column("target", "str", "name of the reflector that was measured"))
-    fixed_to = Column("target_on", "str", "what the reflector is fixed to", False, (ON_PLATFORM, ON_WORLD))
-    more["measured_z_mm"].append(fixed_to)
-    kinds = "how the robot moved between the rows", False, KINDS
-    more["measured_z_mm"].append(Column("motion", "str", *kinds))
-    straight = "what is straight from stop to stop", False, BETWEEN
-    more["measured_z_mm"].append(Column("motion_between", "str", *straight))
-    for after, added in more.items():
+        optional[after] += [Column(name.format(axis), "float64", f"{text}, {axis}", nullable) for axis in "xyz"]
+    optional["measured_z_mm"] += _BY_ROW
+    for after, added in optional.items():
         at = [column.name for column in columns].index(after) + 1
         columns[at:at] = [column for column in added if column.name in names]
     return replace(table, columns=tuple(columns))

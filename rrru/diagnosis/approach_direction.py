@@ -1,4 +1,4 @@
-"""The side from which each drive comes to a reading: where the rows do not determine it, and its posterior odds.
+"""The side from which each drive comes to a reading: where the rows do not determine it, and its posterior mean.
 
 Backlash and friction windup change their sign with the sense in which a drive arrives. At the start of a run no row
 says how the robot got there; near a reversal of a drive the path between the readings is an interpolation, which may
@@ -39,24 +39,27 @@ if TYPE_CHECKING:
     from rrru.diagnosis.problem import DiagnosisProblem
 
 _ROUNDING = {"rad": OPTIONS.drive_rounding_rad, "mm": OPTIONS.drive_rounding_mm}
-# the next difference, over its deviation for white noise, of a motion with 4 points a period: sin(pi / 4)
-_FOUR_A_PERIOD = np.sqrt(0.5)
+# of a sine with 4 points a period: ratio of the rms of its k+1-th difference over sqrt(C(2k + 2, k + 1)) to that of its
+# k-th difference over sqrt(C(2k, k)), for large k, about sin(pi / 4); of white noise it is 1
+_MIN_RATIO_OF_DIFFERENCES = np.sqrt(0.5)
 
-# points of a path, denser near its ends: a drive may turn back just before a stop
-_STEPS = 16
-_SHARES = 0.5 * (1.0 - np.cos(np.pi * np.arange(_STEPS + 1) / _STEPS))
+# steps of the path from one stop to the next, and their shares of the way, denser near its ends: a drive may turn back
+# just before a stop
+_STEPS_PER_WAY = 16
+_SHARES = 0.5 * (1.0 - np.cos(np.pi * np.arange(_STEPS_PER_WAY + 1) / _STEPS_PER_WAY))
 # senses of arrival that differ by less are the same: values of a long drive are rounded to some 1e-5 of its rest width
-_SAME = 0.01
+_SENSE_TOLERANCE = 0.01
 
 
 def read_back_jitter(drive: FloatArray, run: IntArray) -> FloatArray:
-    """Standard deviation (K,) of the random error of drive values (n, K) along runs (n,).
+    """Standard deviation (K,) of the random error of drive values (n, K) along runs (n,), in rad or mm.
 
     The k-th difference of white noise of deviation s has the deviation s sqrt(C(2k, k)); that of a smooth motion
-    decreases relative to it with k. The estimate of a run is that of the first order from which on it does not
-    decrease, while a motion with 4 points a period still would. Zero where no order is such, or where a run is short.
-    Deviations are by medians of absolute values, which corners do not change. The result is the lower quartile of the
-    runs: a motion with fewer points a period is taken for jitter, and nothing makes a run's jitter smaller.
+    decreases relative to it with k. The estimate of a run is that of the first order from which on it decreases by less
+    than that of a motion with 4 points a period would. It is zero where there is no such order, or where a run is
+    short. Deviations are by medians of absolute values, which corners do not change. The result is the lower quartile
+    over the runs: a motion with fewer points a period makes the estimate of its run too large, and nothing makes it too
+    small.
 
     Source: Hall, Kay and Titterington, Asymptotically optimal difference-based estimation of variance in nonparametric
     regression, Biometrika 77, 1990, for the differences.
@@ -76,12 +79,12 @@ def _jitter_of_run(drive: FloatArray) -> FloatArray:
         sizes.append(size / np.sqrt(comb(2 * order, order)))
     result = np.zeros(drive.shape[1])
     for before, after in reversed([*pairwise(sizes)]):
-        result = np.where(after > _FOUR_A_PERIOD * before, after, result)
+        result = np.where(after > _MIN_RATIO_OF_DIFFERENCES * before, after, result)
     return result
 
 
 def rest_widths(drive: FloatArray, run: IntArray, units: Sequence[str]) -> FloatArray:
-    """Changes (K,) of drive values (n, K) along runs (n,) that are no motion, in the drives' units."""
+    """Rest widths (K,), in the drives' units: smaller changes of drive values (n, K) along runs (n,) are no motion."""
     rounding = np.array([_ROUNDING[unit] for unit in units])
     span = np.ptp(drive, axis=0)
     widest = np.array([span[[other == unit for other in units]].max() for unit in units])
@@ -93,9 +96,9 @@ def rest_widths(drive: FloatArray, run: IntArray, units: Sequence[str]) -> Float
 def at_reversals(course: Course, other_path: FloatArray, widths: FloatArray) -> BoolArray:
     """Rows (n, K) at which a drive reverses: its sense of arrival there is not determined.
 
-    course: with drive, path_drive and path_index; other_path (N, K): actuator values along the path by another
-    interpolation. As far as the two are apart between a reading and its neighbours, neither determines where a drive
-    reverses. widths (K,): of `rest_widths`.
+    course: with drive (n, K), path_drive (N, K) and path_index (n,); other_path (N, K): actuator values along the path
+    by another interpolation. As far as the two are apart between a reading and its neighbours, neither determines where
+    a drive reverses. widths (K,): of `rest_widths`.
     """
     stations = np.unique(course.path_index)
     apart = np.maximum.reduceat(np.abs(course.path_drive - other_path), stations)
@@ -115,7 +118,7 @@ def at_reversals(course: Course, other_path: FloatArray, widths: FloatArray) -> 
 
 @numba.njit(cache=True)
 def _reversals(path: FloatArray, width: float) -> BoolArray:
-    """Rows (N,) from which on a drive turns back along its path (N,) by more than a width."""
+    """Whether after rows (N,) of its path (N,) a drive has turned back by more than a width since its last extremum."""
     result = np.zeros(len(path), dtype=np.bool_)
     low = high = path[0]
     sense = 0
@@ -131,18 +134,18 @@ def _reversals(path: FloatArray, width: float) -> BoolArray:
 
 
 def estimate_approach(problem: DiagnosisProblem, state: ModelState, responses: FloatArray) -> FloatArray:
-    """The motion's `approach` (n, K) by what a state leaves of a problem's readings.
+    """The motion's `approach` (n, K), its unknown senses (finite values) replaced by their posterior means in -1..1.
 
-    Both senses of every drive have equal prior probability. The combinations of the senses at a stop have the odds of
-    the likelihood of all that was read there; the expected sense is their mean.
-    responses (m, 3, K): change of what is read by a sense of 1 of each drive.
+    Both senses of every drive have equal prior probability. The combinations of the senses at a stop have posterior
+    probabilities in proportion to the likelihood of all that was read there, with the residuals of a state.
+    responses (m, 3, K): change in mm of what is read by a sense of 1 of each drive.
     """
     approach = np.array(problem.motion.approach)
     unknown = np.isfinite(approach)
-    # the residual under even odds
-    plain = replace(problem, motion=replace(problem.motion, approach=np.where(unknown, 0.0, approach)))
+    # both senses equally probable: no effect of the approach
+    neutral = replace(problem, motion=replace(problem.motion, approach=np.where(unknown, 0.0, approach)))
     scale = problem.axis_mm
-    left, response = plain.residual(state) / scale, responses / scale[:, None]
+    residual, response = neutral.residual(state) / scale, responses / scale[:, None]
     size = np.sqrt((response**2).sum(axis=1)) > OPTIONS.min_approach_response_per_noise
     approach[unknown] = 0.0
     acting = (unknown[problem.at] & size).any(axis=1)
@@ -152,11 +155,11 @@ def estimate_approach(problem: DiagnosisProblem, state: ModelState, responses: F
         power = (response[here][..., drives] ** 2).sum(axis=(0, 1))
         drives = np.sort(drives[np.argsort(-power, kind="stable")][: OPTIONS.max_jointly_estimated_drives])
         senses = np.array([*product((-1.0, 1.0), repeat=len(drives))])
-        lacking = left[here].ravel() - senses @ response[here].reshape(-1, response.shape[-1])[:, drives].T
-        log = -0.5 * (lacking**2).sum(axis=1)
-        odds = np.exp(log - np.logaddexp.reduce(log))
+        misfit = residual[here].ravel() - senses @ response[here].reshape(-1, response.shape[-1])[:, drives].T
+        log_likelihood = -0.5 * (misfit**2).sum(axis=1)
+        probability = np.exp(log_likelihood - np.logaddexp.reduce(log_likelihood))
         points = np.unique(problem.at[here])
-        approach[points[:, None], drives] = np.where(unknown[points[:, None], drives], odds @ senses, np.nan)
+        approach[points[:, None], drives] = np.where(unknown[points[:, None], drives], probability @ senses, np.nan)
     return approach
 
 
@@ -168,12 +171,12 @@ def has_direction(effect: TestedEffect) -> bool:
 def paths_between_stops(
     mechanism: Robot, drive: FloatArray, position_mm: FloatArray, between: str | None
 ) -> tuple[list[FloatArray], IntArray]:
-    """Actuator values (N, K) along everything that is driven, one path for each way that the robot may have taken, and
-    their rows (s,) at the stops; `between` as `rrru.campaign.stated_motion.StatedMotion` has it.
+    """Actuator values (N, K) along the path through all stops, by each possible interpolation, and rows of the stops.
 
-    drive (s, K), position_mm (s, 3): of the stops.
+    drive (s, K), position_mm (s, 3): of the stops; between: DRIVES (PTP), TOOL (LIN) or None for either; the rows (s,)
+    are of the stops in the paths.
     """
-    index = _STEPS * np.arange(len(drive))
+    index = _STEPS_PER_WAY * np.arange(len(drive))
     ways = {DRIVES: _straight_in_drives, TOOL: _straight_in_tool}
     chosen = [between] if between else [DRIVES, TOOL]
     return [_joined(ways[name](mechanism, drive, position_mm), drive) for name in chosen], index
@@ -186,9 +189,11 @@ def undetermined_senses(paths: Sequence[FloatArray], index: IntArray, run: IntAr
     determine nothing where they come from different sides. widths (K,): changes of drive values that are no motion.
     """
     senses = [_senses_of_arrival(path, index, run, widths) for path in paths]
-    lost = [np.logical_or.reduceat(np.isnan(path), np.maximum(index - _STEPS + 1, 0)) for path in paths]
+    lost = [np.logical_or.reduceat(np.isnan(path), np.maximum(index - _STEPS_PER_WAY + 1, 0)) for path in paths]
     least = np.min([np.abs(sense) for sense in senses], axis=0)
-    return np.asarray((least < 1.0 - _SAME) | (np.ptp(senses, axis=0) > _SAME) | np.any(lost, axis=0))
+    return np.asarray(
+        (least < 1.0 - _SENSE_TOLERANCE) | (np.ptp(senses, axis=0) > _SENSE_TOLERANCE) | np.any(lost, axis=0)
+    )
 
 
 def _senses_of_arrival(path: FloatArray, index: IntArray, run: IntArray, widths: FloatArray) -> FloatArray:
@@ -215,24 +220,20 @@ def _straight_in_tool(mechanism: Robot, drive: FloatArray, position_mm: FloatArr
     """
     straight = _straight_in_drives(mechanism, drive, position_mm)
     shape, poses = straight.shape, mechanism.solve(drive, position_mm)
-    place = position_mm[:-1, None] + _SHARES[:, None] * np.diff(position_mm, axis=0)[:, None]
+    ends = poses.point(np.asarray(mechanism.tool_mm)) if mechanism.orients else position_mm
+    place = (ends[:-1, None] + _SHARES[:, None] * np.diff(ends, axis=0)[:, None]).reshape(-1, 3)
     if mechanism.orients:
         turn, first = _turning(poses.turn), straight.reshape(-1, shape[2])
-        place = poses.point(np.asarray(mechanism.tool_mm))
-        place = place[:-1, None] + _SHARES[:, None] * np.diff(place, axis=0)[:, None]
-        place = place.reshape(-1, 3)
-        found = inverse_kinematics(mechanism, (place, turn), (first.copy(), place), mechanism.twists(), False).reshape(
-            shape
-        )
+        found = inverse_kinematics(mechanism, (place, turn), (first, place), mechanism.twists(), False).reshape(shape)
     else:
-        found = mechanism.inverse(place.reshape(-1, 3)).reshape(shape)
+        found = mechanism.inverse(place).reshape(shape)
     # both ends agree with the rows, also for a controller that corrects the robot's errors
     found = found + (1.0 - _SHARES[:, None]) * (straight - found)[:, :1] + _SHARES[:, None] * (straight - found)[:, -1:]
     return np.asarray(found)
 
 
 def _turning(turn: FloatArray) -> FloatArray:
-    """Orientations (m, 3, 3) on the ways between those (s, 3, 3) of stops, each way about one axis."""
+    """Orientations (m, 3, 3) on the ways between those (s, 3, 3) of stops: on each way a rotation about one axis."""
     start = Rotation.from_matrix(np.repeat(turn[:-1], len(_SHARES), axis=0))
     whole = Rotation.from_matrix(turn[:-1].transpose(0, 2, 1) @ turn[1:]).as_rotvec()
     part = Rotation.from_rotvec((_SHARES[None, :, None] * whole[:, None]).reshape(-1, 3))

@@ -1,4 +1,4 @@
-"""The diagnosis of one campaign: variance by factor, causes, explained fraction and what to measure next."""
+"""The diagnosis of one campaign: problem, posterior of the causes, verdict, budget and what to measure next."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
@@ -63,11 +63,15 @@ STEPS = ("problem", "posterior of the causes", "shrinkage and budget", "next run
 class MeasuredRobot:
     """What is known of the robot that a campaign was measured on.
 
-    mechanism: its nominal one; masses: `rrru.kinematics.dynamics.Masses`; noise_mm: of the instrument, per axis, None
-    where it is not stated (0, of a simulation without noise, is estimated with a note), and noise_rad: of the
-    orientations that it reads; noise_known: noise_mm is exact, not a guess within 30 %; campaign: name of the campaign,
-    for its random stream; limits: of further runs. Raises ConfigError for a negative noise_mm, or a noise_rad that is
-    not positive.
+    mechanism: its nominal model; masses: `rrru.kinematics.dynamics.Masses`.
+    noise_mm: standard deviation of the instrument's positions per axis. None, for one that is not stated, and 0, of a
+        simulation without noise, are replaced by an estimate, with a note for 0.
+    noise_rad: standard deviation of measured orientations per axis, None where it is not stated.
+    noise_known: whether noise_mm is exact; else it is within 30 %, 1 sigma.
+    campaign: name of the campaign, for messages and its random stream.
+    limits: of further runs.
+
+    Raises ConfigError for a negative noise_mm, or a noise_rad that is not positive.
     """
 
     mechanism: Robot
@@ -80,15 +84,18 @@ class MeasuredRobot:
 
     def __post_init__(self) -> None:
         if self.noise_mm is not None and not self.noise_mm >= 0.0:
-            raise ConfigError(f"noise_mm is {self.noise_mm}; allowed: a positive number, or None where it is unknown")
+            raise ConfigError(f"noise_mm is {self.noise_mm}; allowed: 0 or more, or None where it is unknown")
         if self.noise_rad is not None and not self.noise_rad > 0.0:
             raise ConfigError(f"noise_rad is {self.noise_rad}; allowed: a positive number, or None where it is unknown")
 
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """verdict: mapping of `gap_verdicts` without the campaign; tables: frames by name, without the campaign; state: the
-    corrected model; inference: the result of the search; decided: the Verdict itself.
+    """Result of a diagnosis.
+
+    verdict: row of `gap_verdicts` without the campaign; tables: frames by name of the table, without the campaign.
+    state: parameters of the corrected model; inference: the posterior and the fit; decided: the Verdict of which
+    `verdict` is the row.
     """
 
     verdict: dict[str, Any]
@@ -99,7 +106,7 @@ class Diagnosis:
 
 
 def with_wide_bounds(mechanism: Robot) -> Robot:
-    """The mechanism with bounds wide enough for a gap to appear in the deviations."""
+    """The mechanism with bounds of its deviations so wide that no effect moves them to a bound."""
     return mechanism.widened(OPTIONS.parameter_bound_rad, OPTIONS.parameter_bound_mm)
 
 
@@ -112,9 +119,9 @@ def diagnose(
 ) -> Diagnosis:
     """Diagnosis of a measurement table of a MeasuredRobot.
 
-    details: also the tables beyond the verdict, its budget and parameters and what to measure next. progress: called
-    with each of STEPS as it begins. Raises FitError where the readings do not determine the calibration with some to
-    spare, see `rrru.diagnosis.determined`.
+    details: whether to make all tables, not only budget, parameters, drive functions, remainder, points left out and
+    what to measure next. progress: called with each of STEPS as it begins. Raises FitError where the readings do not
+    determine the calibration with some to spare, see `rrru.diagnosis.determined`.
     """
     begin = progress or (lambda _: None)
     begin(STEPS[0])
@@ -160,8 +167,8 @@ def diagnose(
     return Diagnosis(row, tables, inference.state, inference, verdict)
 
 
-def _found(inference: InferenceResult) -> Iterator[str]:
-    """Notes on what was found of the robot in addition to its effects."""
+def _findings(inference: InferenceResult) -> Iterator[str]:
+    """Notes on zero offsets, biased parameters and the payload, which are found in addition to the effects."""
     yield from zero_notes(inference.fit.estimate, inference.problem.mechanism)
     yield from bias_notes(inference)
     yield from payload_notes(inference)
@@ -189,7 +196,7 @@ def _notes(inference: InferenceResult, stated_mm: float | None, excluded: pd.Dat
 
 
 def _joined(notes: Sequence[str]) -> str:
-    """Notes as one text, separated by semicolons, which none of them has itself."""
+    """Notes as one text, separated by semicolons; those within a note become commas."""
     return "; ".join(note.replace("; ", ", ") for note in notes)
 
 
@@ -203,10 +210,11 @@ def _row(
 ) -> Row:
     """The row of `gap_verdicts` without the campaign.
 
-    about: the stated noise in mm, the rows of `gap_left_out` and those of `gap_parameters`.
+    worst_mm (3,): where the residual is largest; about: the stated noise in mm, the rows of `gap_left_out` and those of
+    `gap_parameters`. Columns of a corrected file are filled where one is written.
     """
     stated_mm, excluded, numbers = about
-    found = [] if verdict.no_answer else _found(inference)
+    found = [] if verdict.no_answer else _findings(inference)
     problem, noise = inference.problem, inference.problem.noise or NoiseModel.white(inference.problem.noise_mm)
     return {
         "effects": verdict.label,
@@ -248,8 +256,8 @@ def _decide(
     The probabilities come from the evidence, and cross-validation has a veto. An effect that predicts left-out points
     worse than the verdict without it, by more than chance, is ruled out, and the others are decided again. Where
     something is unexplained an effect may be a part of that: it has to predict them better, and to make more than a
-    small part of the gap, to be named. One that is too small for a name stays in the model where left-out points are
-    nearer with it.
+    small part of the gap, to be named. One that is too small for a name stays in the model where it predicts left-out
+    points better.
     """
     ruled_out: set[str] = set()
     small: frozenset[str] = frozenset()
@@ -269,7 +277,7 @@ def _decide(
                 unnamed = tuple(name for name in verdict.effects if name in small and shares.get(name, 0.0) > 0.0)
                 continue
             if any(shares.get(name, 1.0) <= 0.0 for name in unnamed):
-                # a rough function can be probable and move the left-out points away
+                # a rough function can be probable and predict left-out points worse
                 unnamed = tuple(name for name in unnamed if shares.get(name, 0.0) > 0.0)
                 continue
             named = tuple(term.effect for term, _ in ordered if term.effect in verdict.effects)

@@ -1,4 +1,4 @@
-"""The hypotheses of the diagnosis: sets of terms, a term being one effect in one shape on certain legs."""
+"""Terms of hypotheses: one effect with fixed shape parameters, on all legs, with one value for all, or on one leg."""
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
@@ -17,7 +17,11 @@ EACH, SAME = "each", "same"
 
 @dataclass(frozen=True)
 class EffectTerm:
-    """One effect of a hypothesis: its name, the number of its shape, and "each", "same" or the one leg it acts on."""
+    """One effect of a hypothesis.
+
+    effect: its name; shape: number of the values of its nonlinear parameters in `Coordinates.shapes`, such as a gear
+    ratio; legs: EACH, SAME or the number of the one leg that it acts on.
+    """
 
     effect: str
     shape: int = 0
@@ -25,7 +29,7 @@ class EffectTerm:
 
 
 def spread(coordinates: Coordinates, legs: str | int) -> FloatArray:
-    """Matrix (c, k) from the k free numbers of a term to the effect's coordinates."""
+    """Matrix (c, k) from the k free coefficients of a term on these legs to the effect's c coordinates."""
     every = np.eye(len(coordinates))
     if legs == EACH:
         return every
@@ -38,7 +42,7 @@ def spread(coordinates: Coordinates, legs: str | int) -> FloatArray:
 
 
 def shape_probabilities(coordinates: Coordinates) -> FloatArray:
-    """Prior probabilities (shapes,) of the shapes of an effect."""
+    """Prior probabilities (shapes,) of the shapes of an effect, alike where it states none."""
     count = len(coordinates.shapes)
     return np.asarray(coordinates.weights or np.full(count, 1.0 / count))
 
@@ -54,7 +58,7 @@ def per_leg(effect: TestedEffect) -> bool:
 
 
 def legs_alike(effect: TestedEffect) -> bool:
-    """Whether an effect has the same number of coordinates on each leg, so that legs may share values."""
+    """Whether an effect has the same number of coordinates on each leg, so that all legs may share one value."""
     legs = effect.coordinates.legs
     return per_leg(effect) and len(np.unique(np.unique(legs, return_counts=True)[1])) == 1
 
@@ -75,9 +79,12 @@ def variants(effect: TestedEffect) -> tuple[EffectTerm, ...]:
 
 
 def signatures(library: Library, linear: LinearizedProblem, terms: Sequence[EffectTerm]) -> list[FloatArray]:
-    """Columns (n, 3, k) of each term's free numbers on a linearisation."""
+    """Columns (n, 3, k) of the linearised model by the free coefficients of each term."""
     pairs = ((linear.columns[term.effect, term.shape], term) for term in terms)
-    return [c if t.legs == EACH else c @ spread(library[t.effect].coordinates, t.legs) for c, t in pairs]
+    return [
+        columns if term.legs == EACH else columns @ spread(library[term.effect].coordinates, term.legs)
+        for columns, term in pairs
+    ]
 
 
 def sites(library: Library, motion: Motion, term: EffectTerm, legs: Collection[int] | None = None) -> list[str]:

@@ -30,4 +30,4 @@ _SOURCE = "difference of diameters over four of them, or tilt squared over four,
 
 def for_robot(robot: Robot) -> Effect | None:
     """The effect model for the drives that turn, None for robots without any."""
-    return of_encoders(robot, "encoder_ovality", 2.0, _SOURCE, 2e-4)
+    return of_encoders(robot, "encoder_ovality", periods=2.0, source=_SOURCE, typical_rad=2e-4)

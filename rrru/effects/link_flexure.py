@@ -1,4 +1,4 @@
-"""Link flexure: links that push a platform deflect along their length, links and bearings of an arm across its joints.
+"""Link flexure: axial compliance of links that push a platform; compliance of an arm's links and bearings.
 
 Forearm i pushes the platform with the force f_i along its own direction g_i (compression positive,
 `rrru.kinematics.dynamics.loads`). With its end fittings and U-joint it is a spring of compliance k_i; compression
@@ -6,23 +6,23 @@ shortens it:
 
     dL3_i = -k_i f_i
 
-It enters at the length L3, one compliance per leg, and is linear in k. The platform follows its load: it sinks under
-its weight, and further in proportion to a payload, which separates it from errors of the lengths. `drive_compliance`
-does so too, but with the drive's torque, so that the pattern over the workspace differs.
+It enters at the length L3, one compliance per leg, and is linear in k. The platform sinks under its weight, and further
+in proportion to a payload, which separates it from errors of the lengths. `drive_compliance` does so too, but with the
+drive's torque, so that the pattern over the workspace differs.
 
 A member that is itself driven, as a hexapod's leg, is no forearm: a spring along it acts like the spring of its drive,
 whatever part of the leg it is, and both are `drive_compliance`.
 
-Which force the forearm carries depends on joint 3: free, it is the component along the forearm; held by friction, the
-leg is one two-force member from elbow to U-joint (`held_n` of `rrru.kinematics.dynamics.Loads`). Both are fitted;
-`held` is 0 or 1, or a share between.
+Which force the forearm of a 3-RRRU carries depends on its passive joint 3: if free, it is the component along the
+forearm; held by friction, the leg is one two-force member from elbow to U-joint (`held_n` of
+`rrru.kinematics.dynamics.Loads`). Both are fitted; `held` is 0 or 1, or a share between.
 
-An arm has no such members: its links bend, and its bearings tilt. At every turning joint all that it carries turns by
+An arm has no such members: its links bend, and its bearings tilt. At every turning joint all that it carries rotates by
 
     w = c_j (m - (m . a) a)
 
-with the moment m of the loads about the joint and its axis a: one compliance c_j per joint, alike in both directions
-across the axis. What turns about the axis is `drive_compliance`.
+with the moment m of the loads about the joint and its axis a: one compliance c_j per joint, equal in both directions
+across the axis. Compliance about the axis is `drive_compliance`.
 
 Assumptions: a two-force member, no bending (the lumped half of its own mass hangs at its end); linear spring.
 
@@ -59,27 +59,30 @@ def for_robot(robot: Robot) -> Effect | None:
 
 
 def held_shares(robot: Robot) -> tuple[float, ...]:
-    """Shares to which friction may hold joint 3: none, and wholly where a joint within the leg may be held."""
+    """Values of `held` that are tried: 0, and 1 where friction may hold a joint within the leg."""
     return (0.0, 1.0) if robot.parts.held_from else (0.0,)
 
 
 def member_force(motion: Motion, held: float) -> FloatArray:
-    """Forces (n, members) in N with which members push the platform, joint 3 being held to a share."""
+    """Forces (n, members) in N with which members push the platform; held: 0 to 1, see HELD."""
     return motion.force_n + held * (motion.held_force_n - motion.force_n)
 
 
 def _driven(robot: Robot, member: tuple[str, ...]) -> bool:
-    """Whether a drive only lengthens a member of these sites."""
+    """Whether a drive does nothing but lengthen the member of these sites."""
     nothing = np.zeros(6)
-    lengthened = {site: unit_twist(0) for site in member}
+    lengthening = {site: unit_twist(0) for site in member}
     return any(
-        all(np.array_equal(lengthened.get(s, nothing), drive.twists.get(s, nothing)) for s in {*member, *drive.twists})
+        all(
+            np.array_equal(lengthening.get(site, nothing), drive.twists.get(site, nothing))
+            for site in {*member, *drive.twists}
+        )
         for drive in robot.parts.drives
     )
 
 
 def _shortened(motion: Motion, values: FloatArray) -> Contribution:
-    """Shifts along the members under compliances (members,) in mm/N and the share to which joint 3 is held."""
+    """Shifts in mm along the members; values: compliances (members,) in mm/N, then `held`."""
     return motion.along(motion.robot.parts.members, -values[:-1] * member_force(motion, values[-1]))
 
 
@@ -92,7 +95,7 @@ def _across_joints(joints: tuple[str, ...]) -> Effect | None:
     )
 
     def tilted(motion: Motion, values: FloatArray) -> Contribution:
-        """Turns across the joints' axes under compliances (J,) in rad/(N mm)."""
+        """Rotations in rad across the axes of the J joints under compliances (J,) in rad/(N mm)."""
         turns = values[:, None] * motion.across
         twists = np.concatenate([np.zeros_like(turns), turns], axis=2)
         return motion.at({joint: twists[:, k] for k, joint in enumerate(joints)})

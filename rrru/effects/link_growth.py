@@ -17,7 +17,7 @@ import numpy as np
 
 from rrru.arrays import FloatArray
 from rrru.effects.protocol import Contribution, Effect, Motion, plain_coordinates
-from rrru.effects.thermal_growth import SHAPES, TIME_CONSTANT, lengths, warmth
+from rrru.effects.thermal_growth import SHAPES, TIME_CONSTANT, growth_twists, warm_up_fraction
 from rrru.kinematics.legs import Legs
 from rrru.kinematics.robot import Robot
 from rrru.parameters import Parameter, ParameterSet
@@ -41,14 +41,14 @@ def for_robot(robot: Robot) -> Effect | None:
         """Shifts of the links' ends by their growth under the strains and the time constant in s."""
         *strains, time_constant = values
         longer = sum(strain * links[k] for k, strain in zip(links, strains, strict=True))
-        return Contribution(np.multiply.outer(warmth(motion, time_constant), longer))
+        return Contribution(np.multiply.outer(warm_up_fraction(motion, time_constant), longer))
 
     return Effect("link_growth", parameters, plain_coordinates(parameters, _TYPICAL, SHAPES), grown, ("time_s",))
 
 
 def _links(legs: Legs) -> dict[int, FloatArray]:
     """Twists (sites, 6) that make all lengths of a link longer by their own size, by number of the drive from 1 on."""
-    (leg,), every, drive = legs.legs, lengths(legs), None
+    (leg,), every, drive = legs.legs, growth_twists(legs), None
     result: dict[int, FloatArray] = {}
     for joint in leg.joints:
         site = legs.site_numbers[joint.name]

@@ -21,7 +21,7 @@ import numpy as np
 
 from rrru.arrays import FloatArray
 from rrru.effects.protocol import Contribution, Effect, Motion, plain_coordinates
-from rrru.effects.thermal_growth import SHAPES, TIME_CONSTANT, warmth
+from rrru.effects.thermal_growth import SHAPES, TIME_CONSTANT, warm_up_fraction
 from rrru.kinematics.robot import Robot
 from rrru.parameters import Parameter, ParameterSet
 
@@ -41,7 +41,7 @@ def for_robot(robot: Robot) -> Effect | None:
         change = np.zeros(motion.drive.shape)
         for (_, drive, end_mm), strain in zip(held, strains, strict=True):
             change[:, drive] += strain * (motion.drive[:, drive] - end_mm)
-        return motion.at_drives(warmth(motion, time_constant)[:, None] * change)
+        return motion.at_drives(warm_up_fraction(motion, time_constant)[:, None] * change)
 
     return Effect("screw_growth", parameters, plain_coordinates(parameters, _TYPICAL, SHAPES), grown, ("time_s",))
 

@@ -18,7 +18,7 @@ import numpy as np
 
 from rrru.arrays import FloatArray
 from rrru.effects.protocol import Contribution, Effect, Motion, plain_coordinates
-from rrru.effects.thermal_growth import lengths
+from rrru.effects.thermal_growth import growth_twists
 from rrru.kinematics.robot import Robot
 from rrru.parameters import Parameter, ParameterSet
 
@@ -35,4 +35,4 @@ def for_robot(_robot: Robot) -> Effect:
 def _grown(motion: Motion, values: FloatArray) -> Contribution:
     """Shifts of every link's end by its growth under a coefficient (1,); none where no temperature is known."""
     share = values[0] * np.nan_to_num(motion.temperature_c - _DRAWN_C)
-    return Contribution(np.multiply.outer(share, lengths(motion.robot.legs)))
+    return Contribution(np.multiply.outer(share, growth_twists(motion.robot.legs)))

@@ -6,7 +6,7 @@ as 1 - exp(-t / tau) (Newtonian cooling). With its coefficient of expansion ever
     dl(t) = l e (1 - exp(-t / tau))
 
 where e is the final strain and t the time since the campaign's start, when the robot was at the temperature of its
-drawing. It enters at the lengths. It is linear in e; tau, which is not, is tried on a grid of time constants.
+drawing. It enters at the lengths. It is linear in e, and not in tau, for which a grid of time constants is tried.
 
 A grown 3-RRRU is similar to the nominal one: since all angles stay, the platform moves along the ray from the base's
 centre by the strain itself, p' = (1 + e(t)) p. Only repeated passes separate it from errors of the lengths: the same
@@ -37,19 +37,20 @@ _PARAMETERS = ParameterSet(
 )
 
 
-def warmth(motion: Motion, time_constant: float) -> FloatArray:
-    """Share (n,) of its final excess temperature that a body has; 0 where the time is unknown."""
+def warm_up_fraction(motion: Motion, time_constant: float) -> FloatArray:
+    """Excess temperature (n,) over the final one, 1 - exp(-t / tau), with tau in s; 0 where the time is unknown."""
     return -np.expm1(-np.nan_to_num(motion.time_s) / time_constant)
 
 
 def _grown(motion: Motion, values: FloatArray) -> Contribution:
-    """Shifts of every link's end by its growth under final strain and time constant in s."""
-    strain, time_constant = values
-    return Contribution(np.multiply.outer(strain * warmth(motion, time_constant), lengths(motion.robot.legs)))
+    """Shifts in mm of every link's end by its growth; values: final strain, time constant in s."""
+    final_strain, time_constant = values
+    strain = final_strain * warm_up_fraction(motion, time_constant)
+    return Contribution(np.multiply.outer(strain, growth_twists(motion.robot.legs)))
 
 
-def lengths(legs: Legs) -> FloatArray:
-    """Twists (sites, 6) that make every length longer by its own size: the lengths at each site."""
+def growth_twists(legs: Legs) -> FloatArray:
+    """Twists (sites, 6) under a strain of 1, which doubles all lengths: the vector in mm of each length at its site."""
     result = np.zeros((len(legs.sites), 6))
     for leg in legs.legs:
         for joint in leg.joints[1:]:

@@ -19,7 +19,7 @@ import numpy as np
 
 from rrru.arrays import FloatArray
 from rrru.effects.protocol import Contribution, Effect, Motion, of_drives, plain_coordinates
-from rrru.effects.thermal_growth import SHAPES, TIME_CONSTANT, warmth
+from rrru.effects.thermal_growth import SHAPES, TIME_CONSTANT, warm_up_fraction
 from rrru.kinematics.legs import Leg
 from rrru.kinematics.robot import Robot
 from rrru.parameters import Parameter, ParameterSet
@@ -52,7 +52,7 @@ def for_robot(robot: Robot) -> Effect | None:
         """Changes of the actuator values under final drifts (k,) and the time constant in s."""
         *drifts, time_constant = values
         change = np.zeros(motion.drive.shape)
-        change[:, numbers] = np.outer(warmth(motion, time_constant), drifts)
+        change[:, numbers] = np.outer(warm_up_fraction(motion, time_constant), drifts)
         return motion.at_drives(change)
 
     coordinates = plain_coordinates(parameters, of_drives(drives, _TYPICAL), SHAPES)

@@ -1,20 +1,19 @@
-"""Rotary Delta robot (paper C): the nominal model of its controller.
+"""Rotary Delta robot: the nominal model of its controller, after paper C (`docs/sister-studies.md`).
 
 Frame of the static platform O-XYZ: the three drive axes lie in the plane Z = 0, z UP, leg i at the structure angle
-beta_i = -pi/6 + 2 pi (i-1)/3, so that Y points to the second drive axis (the scan prints every minus sign as a question
-mark). The calibration frame o-xyz has the same directions and its origin where the platform stands at zero drive
-angles, in the middle of the workspace:
+beta_i = -pi/6 + 2 pi (i-1)/3, so that Y points to the second drive axis. The calibration frame o-xyz has the same
+directions and its origin where the platform stands at zero drive angles, in the middle of the workspace:
 
     r = a_i + l1 u_i + l2 w_i                                                                       (eq. 1)
     u_i = Rot(Z, beta_i - pi/2) Rot(x_i, -theta_i) e_2 = cos(theta_i) e_i - sin(theta_i) z          (eq. 2)
 
-with e_i the outward direction and |a_i| = a the base's radius less the platform's: the platform counts as a point.
-theta > 0 lowers the arm. To first order an error of the drives moves the platform by
+with w_i the direction of the forearm, e_i the outward direction and |a_i| = a the base's radius less the platform's:
+the platform counts as a point. theta > 0 lowers the arm. To first order an error of the drives moves the platform by
 
     w_i . dr = l1 w_i . (du_i / dtheta_i) dtheta_i,   dr = J dtheta                                 (eqs. 3-6)
 
-Of the scan's equations (1), (3) to (6) the text around them is left; they are rebuilt from it. Lengths in mm, angles in
-rad.
+Equations (1) and (3) to (6) are not legible in the scan of the paper and are reconstructed from its text. Lengths in
+mm, angles in rad.
 """
 
 from collections.abc import Mapping
@@ -33,16 +32,21 @@ from rrru.kinematics.point_masses import DriveMotion
 from rrru.robots.three_legs import LEGS, Deviation, of_each, of_each_leg, of_three_legs, points, three_drives
 from rrru.robots.tripod import BARS, Tripod, pair_of_bars
 
-# columns of the legs' numbers: offset of the drive's angle, l1, l2, a
+# columns of the legs' numbers (3, 4): offset of the drive's angle in rad; l1, l2 and a in mm
 _OWN = of_each_leg("dtheta", 0, "rad"), of_each_leg("dl1_", 1), of_each_leg("dl2_", 2), of_each_leg("da_", 3)
 _COMMON = {"dl1": Deviation(1), "dl2": Deviation(2), "da": Deviation(3)}
 
 
 @dataclass(frozen=True)
 class Delta(Tripod):
-    """The robot with its nominal dimensions in mm; parameter_set: "zero" (3), "tied" (6) or "legs" (12)."""
+    """The robot with its nominal dimensions in mm.
 
-    l1_mm: float = 375.0  # ASSUME this and the next two: the paper gives no dimensions
+    parameter_set: "zero": 3 zero offsets; "tied": these and errors of l1, l2 and a that all legs share; "legs": zero
+    offsets and errors of l1, l2 and a of each leg, 12 in all.
+    """
+
+    # ASSUME this and the next two: the paper gives no dimensions
+    l1_mm: float = 375.0
     l2_mm: float = 900.0
     a_mm: float = 125.0
     # the platform's radius and the distance of an arm's two bars: where these are equal, they act on its tilt only
@@ -66,8 +70,10 @@ class Delta(Tripod):
     }
     SOURCE = "paper C, 1.1; bounds assumed"
     COLUMN_SITES = (
-        *((("drive", 4, 1.0),), (("elbow", 0, 1.0),)),
-        *((("a bar", 0, 1.0), ("b bar", 0, 1.0)), (("foot", 0, 1.0),)),
+        (("drive", 4, 1.0),),
+        (("elbow", 0, 1.0),),
+        (("a bar", 0, 1.0), ("b bar", 0, 1.0)),
+        (("foot", 0, 1.0),),
     )
     parts = Parts(
         drives=three_drives("rad", 4),
@@ -85,17 +91,17 @@ class Delta(Tripod):
 
     @property
     def characteristic_length_mm(self) -> float:
-        """Length that makes deviations of angles comparable with those of lengths."""
+        """The arm's length: it makes errors of angles comparable with those of lengths."""
         return self.l1_mm
 
     @property
     def reach_mm(self) -> float:
-        """Length of a stretched leg."""
+        """Length of a stretched leg in mm, arm and forearm."""
         return self.l1_mm + self.l2_mm
 
     @cached_property
     def legs(self) -> Legs:
-        """Six bars, two on the elbow of every arm, side by side."""
+        """Six legs that end in bars, two on the elbow of every arm, side by side."""
         bars: list[Leg] = []
         for leg, azimuth in zip(LEGS, self.azimuth_rad, strict=True):
             root = turn_about(Z, azimuth)
@@ -110,7 +116,7 @@ class Delta(Tripod):
 
     @property
     def origin_depth_mm(self) -> float:
-        """Depth of the calibration frame's origin below the drive axes: the platform's at zero drive angles."""
+        """Depth in mm of the calibration frame's origin below the drive axes: the platform's at zero drive angles."""
         return float(np.sqrt(self.l2_mm**2 - (self.a_mm + self.l1_mm) ** 2))
 
     @cached_property
@@ -119,7 +125,7 @@ class Delta(Tripod):
         return np.tile([0.0, self.l1_mm, self.l2_mm, self.a_mm], (3, 1))
 
     def inverse_of_legs(self, position_mm: FloatArray, legs: FloatArray, sign: float) -> FloatArray:
-        """Drive angles (n, 3) in rad under leg numbers (3, 4), knees outwards for sign 1; NaN where out of reach."""
+        """Drive angles (n, 3) in rad under leg numbers (3, 4), elbows outwards for sign 1; NaN where out of reach."""
         position = points(position_mm)
         u, v = self.radial_tangential(position)
         depth = self.origin_depth_mm - position[:, 2:]
@@ -131,7 +137,7 @@ class Delta(Tripod):
             return np.asarray(np.arctan2(depth, inward) - sign * np.arccos(cosine) - legs[:, 0])
 
     def ends(self, theta_rad: FloatArray, legs: FloatArray) -> FloatArray:
-        """Arms' ends less the platform's radius, (..., n, 3 legs, 3) in mm, calibration frame, for angles (n, 3)."""
+        """Elbows moved inwards by the platform's radius, (..., n, 3 legs, 3) in mm, at angles (n, 3)."""
         angle = theta_rad + legs[..., 0]
         reach = legs[..., 3] + legs[..., 1] * np.cos(angle)
         height = self.origin_depth_mm - legs[..., 1] * np.sin(angle)
@@ -147,5 +153,6 @@ class Delta(Tripod):
 
     def own_load(self, masses: Masses, motion: DriveMotion, _poses: Poses, gravity_mm_s2: FloatArray) -> FloatArray:
         """Torques (n, 3) in N mm of the arms' own masses about their drives; see `rrru.kinematics.dynamics`."""
+        # component of gravity in the direction in which an end of an arm moves
         pulls = -np.cos(motion[0]) * gravity_mm_s2[2] - np.sin(motion[0]) * (self.radial @ gravity_mm_s2)
         return arm_load(masses, self.l1_mm, pulls, motion[2])

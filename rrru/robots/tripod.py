@@ -41,7 +41,7 @@ class Tripod(ThreeLegs):
 
     @abstractmethod
     def ends(self, actuators: FloatArray, legs: FloatArray, /) -> FloatArray:
-        """Links' driven ends less the platform's radius, (..., n, 3 legs, 3) in mm, for actuator values (n, 3)."""
+        """Links' driven ends, moved inwards by the platform's radius, (..., n, 3 legs, 3) in mm; actuators (n, 3)."""
 
     @abstractmethod
     def end_rates(self, actuators: FloatArray, legs: FloatArray, /) -> FloatArray:
@@ -50,7 +50,7 @@ class Tripod(ThreeLegs):
     def inverse(self, position_mm: FloatArray, deviations: FloatArray | None = None, elbow: str = "out") -> FloatArray:
         """Actuator values (n, 3) for positions (n, 3) in mm; NaN where a leg cannot reach.
 
-        `elbow` is "out" (carriages outside of the platform or above it, knees outwards: the robots' assembly) or "in".
+        `elbow` is "out" (carriages outside of the platform or above it, elbows outwards: the robots' assembly) or "in".
         """
         return self.inverse_of_legs(points(position_mm), self.numbers(deviations), ELBOW_SIGN[elbow])
 

@@ -1,4 +1,7 @@
-"""A robot that MuJoCo simulates from its MJCF, with MuJoCo's own causes of errors: an independent second simulator."""
+"""A virtual robot that MuJoCo simulates from its MJCF: a simulator independent of this package's effect models.
+
+Its errors have causes that MuJoCo itself models, see `rrru.simulation.mujoco_causes`.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -25,10 +28,12 @@ from rrru.simulation.tracker import Sees
 
 @dataclass(frozen=True)
 class MujocoRobot(DrivenRobot):
-    """A robot whose truth is a simulation of the MJCF that its mechanism was read from.
+    """A robot whose true poses are a simulation of the MJCF that its mechanism was read from.
 
-    file, platform: of the MJCF; causes: sizes by site by the name of a cause, see `rrru.simulation.mujoco_causes`; the
-    rest as of DrivenRobot. Masses and inertias are the file's.
+    file, platform: path of the MJCF and its platform's body.
+    causes: {name of a cause: {site: size}}, see `rrru.simulation.mujoco_causes`.
+    non_repeatability_mm, rotation_limit_rad: as of DrivenRobot.
+    masses: none, as masses and inertias are the file's.
     """
 
     mechanism: Robot
@@ -40,7 +45,7 @@ class MujocoRobot(DrivenRobot):
     rotation_limit_rad: float = 0.05
 
     def machine(self, payload_kg: float = 0.0) -> Machine:
-        """The Machine of the file with its causes; payload_kg: the heaviest that it will carry.
+        """The Machine of the file with its causes; payload_kg: the largest payload that it will carry.
 
         Raises ConfigError where a cause or a drive does not fit the file.
         """
@@ -53,8 +58,8 @@ class MujocoRobot(DrivenRobot):
         return Machine(edit, self.file)
 
     @property
-    def moves(self) -> bool:
-        """Whether it is read on the way; else it rests at every point."""
+    def measured_in_motion(self) -> bool:
+        """Whether it is measured in motion; else it rests at every point."""
         return not set(MOVING).isdisjoint(self.causes)
 
     def run(
@@ -65,14 +70,14 @@ class MujocoRobot(DrivenRobot):
         controller: Controller | None = None,
         sees: Sees = ONLY_TOOL,
     ) -> tuple[pd.DataFrame, pd.DataFrame]:
-        """Drive a plan, see DrivenRobot; a robot that rests at every point takes longer than the plan says."""
-        driven = plan if self.moves else plan.resting(SETTLE_S)
+        """Drive a plan, see DrivenRobot; a robot that rests at every point takes SETTLE_S longer at each."""
+        driven = plan if self.measured_in_motion else plan.resting(SETTLE_S)
         return super().run(driven, noise_mm, generator, controller, sees)
 
     def posed(self, motion: Motion, target: FloatArray) -> tuple[Poses, FloatArray]:
         """Poses (n) along a Motion as simulated, with no twists; see Machine.drive for the errors raised."""
         payload = np.nan_to_num(motion.payload_kg)
-        position, turn = self.machine(payload.max(initial=0.0)).drive(motion, self.moves)
+        position, turn = self.machine(payload.max(initial=0.0)).drive(motion, self.measured_in_motion)
         count, legs = len(position), self.mechanism.legs
         passive = np.broadcast_to(legs.home_passive, (count, len(legs.passive_joints)))
         poses = Poses(position, turn, passive, np.zeros(count), np.ones(count, dtype=bool))
@@ -101,11 +106,12 @@ def from_config(mechanism: Robot, dimensions: Mapping[str, Any], section: Mappin
         section.get("wobble_mm", 0.0),
         rotation_limit_rad=section.get("rotation_limit_rad", MujocoRobot.rotation_limit_rad),
     )
+    # raises ConfigError where the causes do not fit the file
     robot.machine()
     return robot
 
 
-def _gravity(of_file: FloatArray, up: Sequence[float]) -> FloatArray:
-    """A file's gravity (3,) in m/s^2, turned against `up` where the robot's entry states another direction."""
-    against = -np.linalg.norm(of_file) * np.asarray(up)
-    return of_file if np.allclose(of_file, against) else against
+def _gravity(file_gravity: FloatArray, up: Sequence[float]) -> FloatArray:
+    """A file's gravity (3,) in m/s^2, opposite to `up`, which the robot's entry may state otherwise than the file."""
+    against = -np.linalg.norm(file_gravity) * np.asarray(up)
+    return file_gravity if np.allclose(file_gravity, against) else against

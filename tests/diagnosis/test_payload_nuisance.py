@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import yaml
 
-from rrru.diagnosis.design.expected_information import worth
+from rrru.diagnosis.design.expected_information import present_and_planned
 from rrru.diagnosis.diagnose import MeasuredRobot, diagnose
 from rrru.diagnosis.payload_nuisance import nuisance_priors
 from rrru.diagnosis.settings import GapSettings, check
@@ -59,8 +59,8 @@ def test_the_campaign_driven_once_more_is_worth_as_much_again(misled):
     *_, inference = misled
     nothing = replace(inference.hypothesis, terms=(), prior_scales=np.zeros((len(DISCREPANCY_SCALES), 0)))
     answers = (inference.hypothesis, inference.level), (nothing, inference.level)
-    now, runs = worth(inference, *answers, inference.problem)
-    assert (sum(runs[1:], now + runs[0])).nats() == pytest.approx(2.0 * now.nats(), rel=1e-3)
+    now, runs = present_and_planned(inference, *answers, inference.problem)
+    assert (sum(runs[1:], now + runs[0])).misfit_nats() == pytest.approx(2.0 * now.misfit_nats(), rel=1e-3)
 
 
 def test_with_payload_and_tilt_the_order_of_the_terms_makes_no_difference(misled):

@@ -14,7 +14,7 @@ from scipy.stats import multivariate_normal
 from rrru.diagnosis.calibrate import calibrate
 from rrru.diagnosis.design import advise as advise_module
 from rrru.diagnosis.design.advise import NOTHING, advise
-from rrru.diagnosis.design.expected_information import realized
+from rrru.diagnosis.design.expected_information import realized_log_bayes_factors
 from rrru.diagnosis.design.run_limits import StatedLimits
 from rrru.diagnosis.evidence import averaged
 from rrru.diagnosis.hypothesis import Hypothesis
@@ -303,7 +303,7 @@ def test_what_a_run_adds_is_the_ratio_of_the_predictive_densities_of_its_reading
     names = frozenset(verdict.effects)
     answers = found.posterior.best_of(names), found.posterior.best_of(TWINS - names)
     problem = found.problem
-    added = realized(found, *answers)
+    added = realized_log_bayes_factors(found, *answers)
     assert set(added) == set(problem.run.tolist())
     run = problem.run[-1]
     here, logs = problem.run == run, []
@@ -327,7 +327,7 @@ def test_a_run_that_did_not_decide_is_not_advised_again(added, share, monkeypatc
     """Run 3 drives line_1 again; it was expected to add 6 nats: nothing alike is expected of another such run."""
     frame = pd.DataFrame({"run": np.repeat([1, 2, 3], 10), "trajectory": np.repeat(["line_1", "line_2", "line_1"], 10)})
     inference = SimpleNamespace(problem=SimpleNamespace(measurements=frame, used=np.ones(30, dtype=bool)))
-    known = {"contest": 0, "points": 10}
+    known = {"pair": 0, "points": 10}
     names, gains = (
         ("line_1 once more", "line_1 with 5 kg payload", "line_2 once more", "10 poses"),
         (6.0, 9.0, 5.0, 8.0),
@@ -336,7 +336,7 @@ def test_a_run_that_did_not_decide_is_not_advised_again(added, share, monkeypatc
         known | {"run": name, "trajectory": name.split(" ")[0], "gain_nats": gain}
         for name, gain in zip(names, gains, strict=True)
     ]
-    monkeypatch.setattr(advise_module, "realized", lambda *_: {1: 0.0, 2: 0.0, 3: added})
+    monkeypatch.setattr(advise_module, "realized_log_bayes_factors", lambda *_: {1: 0.0, 2: 0.0, 3: added})
     seen = advise_module._realized(inference, SimpleNamespace(truth=None, rival=None), rows, 0)
     left = [advise_module._as_realized(row, seen)["gain_nats"] for row in rows]
     np.testing.assert_allclose(left, [6.0 * share, 3.0 + 6.0 * share, 5.0 * share, 8.0 * share])

@@ -306,7 +306,11 @@ def test_loads_of_a_coupled_drive_are_mujoco_s(tmp_path):
     ("equality", "driven", "pattern"),
     [
         ('<joint joint1="elbow"/>', ("base", "out"), "joint elbow is held by equality 1"),
-        ('<joint joint1="elbow" joint2="base"/>', ("base", "elbow", "out"), "joint elbow follows base and is driven"),
+        (
+            '<joint joint1="elbow" joint2="base"/>',
+            ("base", "elbow", "out"),
+            "elbow follows base and has an actuator, too",
+        ),
         ('<joint joint1="elbow" joint2="out"/>', ("base",), "joint elbow follows out; allowed: a joint of the legs"),
         (
             COUPLED.replace("-1", "-1 0.3"),

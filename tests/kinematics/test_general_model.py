@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from rrru.effects.thermal_growth import lengths
+from rrru.effects.thermal_growth import growth_twists
 from rrru.kinematics import singularity
 from rrru.kinematics.chain import Poses
 from rrru.kinematics.dynamics import GRAVITY_MM_S2, Masses, loads
@@ -300,7 +300,7 @@ def test_nominal_robots_close_upright_where_they_are_sent(name):
 def test_growth_makes_the_robot_similar(name):
     """Every length longer by one share moves the platform along the ray from the base's centre."""
     robot, points, actuators = _clear(name)
-    share, twists = 1e-3, lengths(robot.legs)[None]
+    share, twists = 1e-3, growth_twists(robot.legs)[None]
     poses = robot.solve(_grown(robot, actuators, share), points, share * twists)
     foot = np.array([0.0, 0.0, getattr(robot, "origin_depth_mm", 0.0)])
     np.testing.assert_allclose(poses.position_mm, foot + (1.0 + share) * (points - foot), rtol=0.0, atol=1e-9)

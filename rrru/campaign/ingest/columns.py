@@ -1,4 +1,7 @@
-"""From a file's cells to columns under our names, in mm and rad; every cell that is not as expected is noted."""
+"""From a file's cells to the columns of `measurements`, in mm and rad; every cell that is not as expected is noted.
+
+`ours` is a column's name in this package, `theirs` its name in the file.
+"""
 
 import difflib
 import re
@@ -20,29 +23,30 @@ from rrru.kinematics.robot import Robot
 
 REQUIRED = ("trajectory", *COMMAND, *MEASURED)
 _GROUPS = (*TURNS.values(), *QUATERNIONS.values(), NOISE)
-# name joins a file of commands
-_MORE = ("target", "name", "temperature_c", *(name for group in _GROUPS for name in group))
+# `name` joins a file of measurements with a file of commands
+_OPTIONAL = ("target", "name", "temperature_c", *(name for group in _GROUPS for name in group))
 _TEXT = ("trajectory", "target")
 _BEFORE_DRIVES, _AFTER_DRIVES = ("run", "point", "time_s"), ("speed_mm_s", "payload_kg")
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 _DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+([eE][+-]?\d+)?", re.ASCII)
-_LARGEST = 1e12
+# larger numbers are no measurements, but damaged cells or markers of missing values
+_MAX_NUMBER = 1e12
 _Limit: TypeAlias = tuple[Callable[[pd.Series], pd.Series], str]
-_COUNTED: _Limit = (lambda v: (v >= 1) & (v <= 1e9) & (v == v.round()), "a whole number: 1, 2, 3, ...")
-# ASSUME what a parallel robot of about a metre can carry and how fast it can go, and campaigns of less than 12 days:
-# clock times show.
+_WHOLE_NUMBER: _Limit = (lambda v: (v >= 1) & (v <= 1e9) & (v == v.round()), "a whole number: 1, 2, 3, ...")
+# ASSUME generous limits of payload and speed of a robot; campaigns of less than 12 days: a time of day or a date, read
+# as seconds, is beyond
 _LIMITS: dict[str, _Limit] = {
-    "run": _COUNTED,
-    "point": _COUNTED,
+    "run": _WHOLE_NUMBER,
+    "point": _WHOLE_NUMBER,
     "time_s": (lambda v: (v >= 0) & (v <= 1e6), "0 to 1e6 s since the campaign's start"),
     "speed_mm_s": (lambda v: (v > 0) & (v <= 2e4), "above 0 and up to 20000 mm/s"),
     "payload_kg": (lambda v: (v >= 0) & (v <= 1e3), "0 to 1000 kg"),
     "temperature_c": (lambda v: (v >= -60) & (v <= 100), "-60 to 100 degrees C"),
     **dict.fromkeys(NOISE, (lambda v: (v > 0) & (v <= 100), "above 0 and up to 100 mm")),
 }
-# the unit of other columns, and units that a header may state in its place
-_OTHER_UNITS = {
+# unit of a column, and other units that a header may state, which are refused
+_REFUSED_UNITS = {
     "time_s": ("s", ("ms", "us", "µs", "min", "h")),
     "speed_mm_s": ("mm/s", ("m/s", "cm/s", "mm/min", "m/min", "in/s", "%")),
     "payload_kg": ("kg", ("g", "t", "lb", "lbs", "n")),
@@ -51,17 +55,17 @@ _OTHER_UNITS = {
 
 
 def known_columns(mechanism: Robot) -> tuple[str, ...]:
-    """Our names of all columns that a robot's file may have."""
-    return (*REQUIRED, *_BEFORE_DRIVES, *mechanism.parts.columns, *_AFTER_DRIVES, *_MORE)
+    """Names in this package of all columns that a robot's file may have."""
+    return (*REQUIRED, *_BEFORE_DRIVES, *mechanism.parts.columns, *_AFTER_DRIVES, *_OPTIONAL)
 
 
 def resolve(
     spec: IngestSpec, cells: Cells, mechanism: Robot, problems: Problems, guessed: Mapping[str, str] | None = None
 ) -> tuple[dict[str, str], list[str]]:
-    """{our name: the file's name} of the columns that a file's Cells have, and the undeclared columns.
+    """{ours: theirs} of the columns that a file's Cells have, and the undeclared columns.
 
-    guessed: {our name: the file's name} of what undeclared columns look like, which messages propose. Missing columns,
-    repeated ones, other units and, unless `extra_columns` is "ignore", undeclared ones are noted.
+    guessed: {ours: theirs} of what undeclared columns look like, which messages propose. Missing columns, repeated
+    ones, other units and, unless `extra_columns` is "ignore", undeclared ones are noted.
     """
     drives, names = mechanism.parts.columns, cells.names
     for name in sorted({name for name in names if names.count(name) > 1}):
@@ -72,14 +76,14 @@ def resolve(
     wanted = {ours: spec.columns.get(ours, means.get(ours, ours)) for ours in known_columns(mechanism)}
     found = {ours: theirs for ours, theirs in wanted.items() if theirs in names}
     extra = [name for name in names if name not in (*found.values(), *cells.unused)]
-    for ours, (unit, others) in _OTHER_UNITS.items():
+    for ours, (unit, others) in _REFUSED_UNITS.items():
         if ours in found and (stated := unit_of(found[ours])) in others:
             allowed = f"{unit}: convert the column, and its name"
             problems.add("unit", column=found[ours], value=f"the unit {stated}", allowed=allowed)
-    # drive values determine the commanded positions as well
-    sent = set(drives) <= set(found) and not set(COMMAND) & set(found)
+    # a file may state actuator values in place of commanded positions, which follow from them
+    only_drives = set(drives) <= set(found) and not set(COMMAND) & set(found)
     for ours, theirs in wanted.items():
-        if ours not in found and ((ours in REQUIRED and not (sent and ours in COMMAND)) or ours in spec.columns):
+        if ours not in found and ((ours in REQUIRED and not (only_drives and ours in COMMAND)) or ours in spec.columns):
             allowed = f"a column {theirs}{_advice(ours, _nearest(theirs, extra))}; the file has {', '.join(names)}"
             problems.add("missing column", column=theirs, value="no such column", allowed=allowed)
     given = ", ".join(found[name] for name in drives if name in found)
@@ -114,7 +118,7 @@ def convert(
 ) -> pd.DataFrame:
     """Frame of our columns in mm and rad, indexed by the row numbers (n,); NaN, or "" as a name, where a cell is noted.
 
-    found: {our name: the file's name}; file: its Cells. An optional column without any value is left out.
+    found: {ours: theirs} as of `resolve`; file: its Cells. An optional column without any value is left out.
     """
     cells, rows = file.cells, file.rows
     measured = [found[name] for name in MEASURED if name in found]
@@ -147,7 +151,7 @@ def convert(
 
 
 def _blank_groups(found: Mapping[str, str], cells: Mapping[str, Sequence[Cell]], count: int) -> dict[str, np.ndarray]:
-    """By column of an orientation the rows (n,) that have none: all its cells are blank."""
+    """By column of an orientation or of the noise whether rows (n,) have none: all cells of the group are blank."""
     result: dict[str, np.ndarray] = {}
     for group in _GROUPS:
         if set(group) <= set(found):
@@ -170,7 +174,10 @@ def _check_limits(frame: pd.DataFrame, found: Mapping[str, str], problems: Probl
 def _numbers(
     cells: Sequence[Cell], rows: Sequence[int], theirs: str, skip: np.ndarray, problems: Problems, comma: bool
 ) -> np.ndarray:
-    """Column (n,) of floats; NaN where a cell is skipped or noted as no number; comma: texts have decimal commas."""
+    """Column (n,) of floats, NaN where a cell is skipped or is no number, which is noted.
+
+    skip (n,): rows to skip; comma: whether texts have decimal commas.
+    """
     values = np.full(len(cells), np.nan)
     for i in np.flatnonzero(~skip).tolist():
         number = _number(cells[i], comma)
@@ -182,10 +189,10 @@ def _numbers(
 
 
 def _number(cell: Cell, comma: bool) -> float | str:
-    """A cell's number; for a cell without a finite one a text, the expected content."""
-    number = np.inf
+    """A cell's number, or for a cell without a finite one a text: what is allowed there."""
     if cell is None or _blank(cell):
         return "a number; drop a row that lacks one"
+    number = np.inf
     if isinstance(cell, str):
         text = cell.strip()
         if comma and "." in text and _NUMBER.fullmatch(text):
@@ -197,7 +204,7 @@ def _number(cell: Cell, comma: bool) -> float | str:
             number = float(text)
     elif isinstance(cell, (int, float, Decimal)) and not isinstance(cell, bool):
         number = float(cell)
-    return number if abs(number) < _LARGEST else "a finite number"
+    return number if abs(number) < _MAX_NUMBER else "a finite number"
 
 
 def _names(ours: str, cells: Sequence[Cell], rows: Sequence[int], theirs: str, problems: Problems) -> list[str]:

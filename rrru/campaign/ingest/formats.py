@@ -10,7 +10,7 @@ from rrru.campaign.ingest.problems import Problems
 from rrru.campaign.ingest.trackers import leica_cells, spatial_analyzer_cells
 from rrru.errors import ConfigError
 
-# reader of a file's bytes by kind, and keys that the kind knows
+# by kind the reader of a file's bytes and the fields of Format that it takes
 _READERS: dict[str, tuple[Callable[..., Cells], tuple[str, ...]]] = {
     "csv": (text_cells, ("separator", "decimal")),
     "leica": (leica_cells, ("separator", "decimal")),
@@ -19,16 +19,18 @@ _READERS: dict[str, tuple[Callable[..., Cells], tuple[str, ...]]] = {
     "parquet": (parquet_cells, ()),
 }
 KINDS = tuple(_READERS)
-# kinds by the file's ending
-_ENDINGS = {".csv": "csv", ".parquet": "parquet", ".xlsx": "xlsx"}
+# kinds by the file's extension
+_EXTENSIONS = {".csv": "csv", ".parquet": "parquet", ".xlsx": "xlsx"}
 
 
 @dataclass(frozen=True)
 class Format:
-    """Format of a file; raises ConfigError for a setting that does not exist.
+    """Format of a file; raises ConfigError for a value that is not allowed.
 
-    kind: one of KINDS, None as the file's ending says; separator: between fields of a text, None: a comma, or of a
-    point list what it has; decimal: "." or ","; sheet: of a workbook, None where it has one alone.
+    kind: one of KINDS; None: that of the file's extension.
+    separator: between the fields of a text; None: a comma in a CSV file, in a tracker's point list what the list has.
+    decimal: "." or ",".
+    sheet: name of a workbook's sheet; None for a workbook with a single one.
     """
 
     kind: str | None = None
@@ -48,18 +50,21 @@ class Format:
 
     @classmethod
     def from_config(cls, section: str | Mapping[str, Any] | None) -> Self:
-        """From the name of a kind, or a mapping of kind, separator, decimal and sheet."""
+        """From the key `format` of a campaign: the name of a kind, or a mapping of fields, as the schema checks."""
         return cls(section) if section is None or isinstance(section, str) else cls(**section)
 
     def kind_of(self, path: Path, problems: Problems) -> str:
-        """The kind of a file; refuses an unknown ending where no kind is stated."""
-        kind = self.kind or _ENDINGS.get(path.suffix.lower())
+        """The kind of a file.
+
+        Raises IngestError for an unknown extension where no kind is stated, ConfigError for a field of another kind.
+        """
+        kind = self.kind or _EXTENSIONS.get(path.suffix.lower())
         if kind is None:
-            allowed = f"{', '.join(_ENDINGS)}, or the format stated: format: {' or '.join(KINDS)}"
+            allowed = f"{', '.join(_EXTENSIONS)}, or the format stated: format: {' or '.join(KINDS)}"
             problems.refuse_now(value=f"the extension {path.suffix!r}", allowed=allowed)
         _, keys = _READERS[kind]
-        given = {"separator": self.separator, "decimal": self.decimal if self.decimal == "," else None}
-        given["sheet"] = self.sheet
+        decimal = self.decimal if self.decimal != "." else None
+        given = {"separator": self.separator, "decimal": decimal, "sheet": self.sheet}
         for key, value in given.items():
             if value is not None and key not in keys:
                 raise ConfigError(f"ingest of {path}: format {kind} has no {key}; allowed: {', '.join(keys) or 'none'}")

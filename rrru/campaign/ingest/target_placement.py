@@ -1,4 +1,4 @@
-"""Registration of the targets: places of a file's reflectors on the platform or in the world, stated or estimated.
+"""Places of a file's reflectors (targets) on the platform or in the world: stated in the configuration or estimated.
 
 The poses are the robot's nominal ones, or those with the lost zero offsets of its drives. Lengths in mm, angles in rad.
 """
@@ -25,34 +25,42 @@ from rrru.kinematics.robot import Robot
 
 # the name of a reflector where the file has no such column
 _UNNAMED = "tool"
-# orientations that differ by less are the same
-_NEVER_TURNS = 1e-6
-# places explain the same residual as zero offsets of the drives where they leave at most so many times as much
+# rotation matrices whose elements differ by less are the same: the platform never turns
+_SAME_ORIENTATION = 1e-6
+# residual with other places of the targets, over that with zero offsets of the drives: up to the first value the places
+# explain the readings as well, up to the second far better
 _AS_GOOD, _FAR_BETTER = 2.0, 0.5
-# share of the robot's size from which a place is grossly wrong; less may be an error of the base or the platform, which
-# the calibration fits
+# a place that is off by a larger share of the robot's size is grossly wrong; less may be an error of the base or the
+# platform, which the calibration fits
 _GROSS_SHARE = 0.01
-# cosine from which on an axis is one of the body's
+# an axis is one of the platform's x, y, z where a component of its unit vector is larger
 _ALONG = 0.9999
-# readings of each reflector at which zero offsets move it, and the share of the move that may differ by rounding
-_SOME_READINGS, _ALIKE = 30, 1e-6
+# readings of each reflector that `_by_zeros` uses at most
+_SOME_READINGS = 30
+# share of a displacement that is rounding
+_ROUNDING = 1e-6
 # rows from which lost zero offsets are estimated; the calibration fits the result to all of them
 _MAX_ROWS = 200
-# ASSUME no platform is off by more than this where the file's frame is the robot's
-_MOST_TURNED_RAD = 0.2
-# ASSUME no robot's platform turns so much otherwise than its nominal model, about 6 degrees in the median
-_MOST_SCATTERED_RAD = 0.1
-# another reading of the orientations is the right one where it leaves less than this share
+# ASSUME no orientations are off by more than this where the file's frame is the robot's
+_MAX_TURNED_RAD = 0.2
+# ASSUME no robot's orientations scatter more about those of its nominal model: about 6 degrees in the median
+_MAX_SCATTER_RAD = 0.1
+# another convention of the orientations (unit, sequence, order) is the right one where it leaves less than this share
 _FAR_LESS = 0.2
 
 
 @dataclass(frozen=True)
 class TargetPlacement:
-    """names (n,) of the reflectors, None where the tool itself is read; place_mm (n, 3): theirs on the platform, or in
-    the robot's frame where on_world (n,) says so; offset_mm (n, 3): where they are as seen from the commanded position,
-    in the robot's frame, with the zeros that its drives were found to have; turn (3, 3): from the platform to what is
-    read as its orientation; strays (n,): rows that are no reading of that reflector; zeros_lost: whether zeros of the
-    drives were found; notes: what was found.
+    """What was measured in the n rows of a file, and where it is.
+
+    names (n,): of the reflectors, None where the tool itself is measured.
+    place_mm (n, 3): position of the row's reflector on the platform, or in the robot's frame where on_world (n,).
+    offset_mm (n, 3): from the commanded position to the reflector in the robot's frame, with the zero offsets that were
+        found.
+    turn (3, 3): rotation matrix from the platform to the body whose orientation is measured.
+    strays (n,): rows that are no reading of their reflector.
+    zeros_lost: whether zero offsets of the drives were found that are not zero.
+    notes: sentences on what was found.
     """
 
     names: np.ndarray | None
@@ -66,11 +74,14 @@ class TargetPlacement:
 
     @property
     def framing(self) -> np.ndarray:
-        """Rows (n,) that determine the instrument's frame."""
+        """Whether rows (n,) determine the instrument's frame."""
         return np.asarray(~self.strays & ~self.on_world)
 
     def columns(self, frame: pd.DataFrame, rotation: np.ndarray) -> dict[str, np.ndarray]:
-        """Columns of a measurement table; rotation (3, 3): of the instrument's frame into the robot's."""
+        """Columns of `measurements` by name, none where the tool is measured.
+
+        frame: the file's table; rotation (3, 3): from the instrument's frame to the robot's.
+        """
         if self.names is None:
             return {}
         result = {"target": self.names.astype(str), **rows.vector_columns("target", self.place_mm)}
@@ -105,16 +116,16 @@ def target_placement(sheet: Sheet) -> TargetPlacement | None:
     left_mm = frames.framed(poses, fitted).off_mm
     if zeros.any():
         _refuse_places(sheet, left_mm, lost)
-        notes += _in_words(sheet, zeros, left_mm) if lost else ()
+        notes += _lost_zero_notes(sheet, zeros, left_mm) if lost else ()
     free = ~frames.known & ~frames.on_world
-    if registered and free.all() and np.ptp(poses.turn, axis=0).max() < _NEVER_TURNS:
+    if registered and free.all() and np.ptp(poses.turn, axis=0).max() < _SAME_ORIENTATION:
         # for a platform that never turns they are confounded with the frame's shift: their mean is set to the tool
         place = place + np.asarray(sheet.mechanism.tool_mm) - np.unique(place, axis=0).mean(axis=0)
     turn = np.eye(3)
     if named and not set(frames.names) <= set(sheet.spec.targets):
         posed = poses, sheet.actuators(command) + zeros, command
         by_zeros = _by_zeros(sheet.mechanism, frames, posed, place, left_mm)
-        notes += _found(sheet, frames, place, (*_precision(frames, poses, left_mm), by_zeros))
+        notes += _place_notes(sheet, frames, place, (*_precision(frames, poses, left_mm), by_zeros))
     if turned:
         turn = _between(poses, rows.turns(frame, "measured"), rotation)
         _refuse_scattered(sheet, poses, rotation)
@@ -132,7 +143,7 @@ def target_placement(sheet: Sheet) -> TargetPlacement | None:
 
 
 def _frames(sheet: Sheet, named: bool) -> tuple[Frames, tuple[str, ...]]:
-    """The Frames of a sheet, and notes on readings that are none of their reflector."""
+    """The Frames of a sheet, and notes on readings that are of no or of another reflector."""
     frame, seen = sheet.frame, rows.measured(sheet.frame)
     names = frame["target"].to_numpy() if "target" in frame else np.full(len(frame), _UNNAMED)
     on_world, right = np.isin(names, sheet.spec.world_targets), np.ones(len(frame), dtype=bool)
@@ -148,7 +159,7 @@ def _frames(sheet: Sheet, named: bool) -> tuple[Frames, tuple[str, ...]]:
 
 
 def _zeros(sheet: Sheet, frames: Frames, command: np.ndarray) -> tuple[np.ndarray, bool]:
-    """Zero offsets (K,) of the drives and whether they are lost, see `rrru.campaign.ingest.zero_offsets`."""
+    """Zero offsets (K,) of the drives in rad or mm, and whether zeros are lost: `rrru.campaign.ingest.zero_offsets`."""
     chosen = np.flatnonzero(frames.framing)
     if len(chosen) > _MAX_ROWS:
         chosen = np.sort(np.random.default_rng(0).choice(chosen, _MAX_ROWS, replace=False))
@@ -158,9 +169,10 @@ def _zeros(sheet: Sheet, frames: Frames, command: np.ndarray) -> tuple[np.ndarra
 
 
 def _refuse_places(sheet: Sheet, left_mm: float, lost: bool) -> None:
-    """Raise IngestError where other places leave far less than the left_mm of zeros of the drives.
+    """Raise IngestError where other places of the targets explain the readings far better than zero offsets do.
 
-    lost: whether these are lost; smaller ones are refused only where the other places are far from the stated ones.
+    left_mm: median residual with the zero offsets; lost: whether these are large. With small ones the file is refused
+    only where the other places are far from the stated ones.
     """
     places = _places(sheet, _FAR_BETTER * left_mm)
     if not places or not (lost or _moved_mm(sheet, places) > _GROSS_SHARE * sheet.mechanism.size_mm):
@@ -178,16 +190,16 @@ def _moved_mm(sheet: Sheet, places: Mapping[str, np.ndarray]) -> float:
     return max(float(np.linalg.norm(place - np.asarray(stated[name]))) for name, place in places.items())
 
 
-def places_instead(sheet: Sheet, most_mm: float) -> str:
+def places_instead(sheet: Sheet, max_mm: float) -> str:
     """The key `targets`, or the place of the tool, with which the nominal robot agrees with readings in its own frame.
 
-    In words; empty where a median distance of more than most_mm remains.
+    As a text for a message; empty where a median distance of more than max_mm remains.
     """
-    places = _places(sheet, most_mm)
+    places = _places(sheet, max_mm)
     return place_words(places) if places else ""
 
 
-def _places(sheet: Sheet, most_mm: float) -> dict[str, np.ndarray]:
+def _places(sheet: Sheet, max_mm: float) -> dict[str, np.ndarray]:
     """Places (3,) by name of the targets, "" for the tool, as for `places_instead`; none where more remains."""
     frame, poses = sheet.frame, sheet.poses
     if sheet.spec.frame != "robot":
@@ -200,12 +212,12 @@ def _places(sheet: Sheet, most_mm: float) -> dict[str, np.ndarray]:
     if not frames.framing.any():
         return {}
     found, names = frames.framed(poses), names[frames.framing]
-    if found.off_mm > most_mm:
+    if found.off_mm > max_mm:
         return {}
     return {name: found.place_mm[names == name][0] for name in dict.fromkeys(names.tolist())}
 
 
-def _in_words(sheet: Sheet, zeros: np.ndarray, left_mm: float) -> tuple[str, ...]:
+def _lost_zero_notes(sheet: Sheet, zeros: np.ndarray, left_mm: float) -> tuple[str, ...]:
     """Notes on lost zeros (K,) of the drives, with which the nominal robot is left_mm off in the median."""
     parts = sheet.mechanism.parts
     shares = np.abs(zeros) / [LOST[unit] for unit in parts.units]
@@ -233,23 +245,25 @@ def check_turned(sheet: Sheet) -> None:
 
 
 def _refuse_scattered(sheet: Sheet, poses: Poses, rotation: np.ndarray) -> None:
-    """Raise IngestError where orientations turn otherwise than the platform does, with what reconciles them if known.
+    """Raise IngestError where orientations do not turn with the platform, with the convention that they seem to have.
 
     poses: the robot's; rotation (3, 3): from the instrument's frame to the robot's, by the positions.
     """
     turns = rows.turns(sheet.frame, "measured")
     scatter = _scatter(poses, turns, rotation)
-    if not scatter > _MOST_SCATTERED_RAD:
+    if not scatter > _MAX_SCATTER_RAD:
         return
     known = np.isfinite(turns).all(axis=(1, 2))
     others = {}
-    for what, read in other_readings(turns[known], sheet.found).items():
+    for convention, read in other_readings(turns[known], sheet.found).items():
         made = np.full(turns.shape, np.nan)
         made[known] = read
-        others[what] = _scatter(poses, made, rotation)
+        others[convention] = _scatter(poses, made, rotation)
     best = min(others, key=others.__getitem__)
-    value = f"orientations that differ by {scatter:.3g} rad in the median from a fixed turn against the platform's"
-    allowed = f"at most {_MOST_SCATTERED_RAD:g} rad"
+    value = (
+        f"orientations that differ by {scatter:.3g} rad in the median from those of the platform times a fixed rotation"
+    )
+    allowed = f"at most {_MAX_SCATTER_RAD:g} rad"
     if others[best] < _FAR_LESS * scatter:
         allowed += f"; {best} leaves {others[best]:.2g} rad"
     else:
@@ -258,17 +272,17 @@ def _refuse_scattered(sheet: Sheet, poses: Poses, rotation: np.ndarray) -> None:
 
 
 def _scatter(poses: Poses, turns: np.ndarray, rotation: np.ndarray) -> float:
-    """Median angle between orientations (n, 3, 3) that are read and the platform's, after the best fixed turn."""
+    """Median angle in rad by which measured orientations (n, 3, 3) turn otherwise than the platform."""
     off = _turned_off(poses, turns, rotation)
     return float(np.median((off * off.mean().inv()).magnitude()))
 
 
 def _check_turned(sheet: Sheet, turn: np.ndarray) -> None:
-    """Note that orientations are read as turned against the platform's by a rotation (3, 3)."""
+    """Note a rotation (3, 3) from the platform to the measured body that is larger than that of any tool."""
     angle = Rotation.from_matrix(turn).magnitude()
-    if angle > _MOST_TURNED_RAD:
+    if angle > _MAX_TURNED_RAD:
         value = f"orientations {angle:.4g} rad from those of the commanded poses in the mean"
-        allowed = f"at most {_MOST_TURNED_RAD:g} rad; frame: register finds frame and tool"
+        allowed = f"at most {_MAX_TURNED_RAD:g} rad; frame: register finds frame and tool"
         sheet.note("frame", TURNS["measured"], value, allowed)
 
 
@@ -282,10 +296,10 @@ def _known(sheet: Sheet, names: np.ndarray) -> np.ndarray:
     return np.array([stated.get(name, nowhere) for name in names], dtype=float)
 
 
-def _found(
+def _place_notes(
     sheet: Sheet, frames: Frames, place: np.ndarray, precision: tuple[np.ndarray, np.ndarray, dict[str, np.ndarray]]
 ) -> tuple[str, ...]:
-    """Notes on the places (n, 3) that were found; precision: of `_precision`, and of `_by_zeros`."""
+    """Notes on the places (n, 3) that were found; precision: the results of `_precision` and of `_by_zeros`."""
     (axes, errors, by_zeros), result = precision, []
     for name in dict.fromkeys(frames.names.tolist()):
         if name in sheet.spec.targets:
@@ -320,12 +334,12 @@ def _precision(frames: Frames, poses: Poses, residual: float) -> tuple[np.ndarra
 def _by_zeros(
     robot: Robot, frames: Frames, posed: tuple[Poses, np.ndarray, np.ndarray], place: np.ndarray, left_mm: float
 ) -> dict[str, np.ndarray]:
-    """What ordinary zero offsets of the K drives move the found place of each reflector by, (K, 3) in mm, by its name.
+    """By reflector the errors (K, 3) in mm of its estimated place that zero offsets of the K drives may cause.
 
-    The places, and the frame where it is registered, take over a part of what a zero offset moves the reflectors by:
-    its least squares fit. The rest of all zero offsets makes the residual, which shows how large they are, if they
-    are alike. Of the last drive of a chain nothing is left, as it moves the platform alike in all poses: no reading
-    tells its zero from the reflectors' places.
+    The estimated places, and the frame where it is registered, absorb a part of the displacements that a zero offset
+    causes: their least squares fit to these. The rest remains as residual, from whose size that of the zero offsets
+    follows, if all are alike. Of the last drive of a chain nothing remains, as it moves the platform alike in all
+    poses: its zero offset is confounded with the reflectors' places.
 
     posed: Poses (n), actuator values (n, K) and nominal positions (n, 3) of the rows; place (n, 3): on the platform or
     the world; left_mm: median residual.
@@ -349,7 +363,7 @@ def _by_zeros(
     flat = moves.reshape(-1, drive.shape[1])
     fitted = np.linalg.lstsq(columns.reshape(len(flat), -1), flat, rcond=1e-9)[0]
     left = flat - columns.reshape(len(flat), -1) @ fitted
-    alike = np.abs(left).max(axis=0) <= _ALIKE * np.abs(flat).max(axis=0)
+    alike = np.abs(left).max(axis=0) <= _ROUNDING * np.abs(flat).max(axis=0)
     left_by_all = np.sqrt((left[:, ~alike] ** 2).sum() / len(chosen))
     size = np.where(alike, 1.0, min(left_mm / max(left_by_all, 1e-12), 1.0))
     return {name: size[:, None] * fitted[6 + 3 * k : 9 + 3 * k].T for k, name in enumerate(free)}
@@ -366,7 +380,7 @@ def _some_readings(frames: Frames, poses: Poses) -> np.ndarray:
 
 
 def _place_text(place: np.ndarray, still: np.ndarray, about: float) -> str:
-    """A place (3,) on the platform in words, with a question mark for a number that the readings do not determine.
+    """Text of a place (3,) on the platform, with a question mark for a coordinate that the readings do not determine.
 
     still (k, 3): axes along which they do not; about: error in mm along the others.
     """
@@ -383,11 +397,11 @@ def _place_text(place: np.ndarray, still: np.ndarray, about: float) -> str:
 
 
 def _between(poses: Poses, turns: np.ndarray, rotation: np.ndarray) -> np.ndarray:
-    """The mean rotation (3, 3) from the platform to the orientations (n, 3, 3) that are read in a frame (3, 3)."""
+    """Mean rotation (3, 3) from the platform to orientations (n, 3, 3) that were measured in a frame (3, 3)."""
     return np.asarray(_turned_off(poses, turns, rotation).mean().as_matrix())
 
 
 def _turned_off(poses: Poses, turns: np.ndarray, rotation: np.ndarray) -> Rotation:
-    """Rotations from the platform to the orientations (n, 3, 3) that are read in a frame (3, 3), at known poses."""
+    """Rotations from the platform to orientations (n, 3, 3) that were measured in a frame (3, 3), at known poses."""
     known = np.isfinite(turns).all(axis=(1, 2)) & poses.closed
     return Rotation.from_matrix(poses.turn[known].transpose(0, 2, 1) @ rotation @ turns[known])

@@ -19,7 +19,13 @@ from rrru.arrays import FloatArray
 from rrru.campaign import measurements as rows
 from rrru.diagnosis.aliases import Row
 from rrru.diagnosis.design import poses
-from rrru.diagnosis.design.expected_information import Contest, contests_of, greedy, realized, worth
+from rrru.diagnosis.design.expected_information import (
+    AnswerPair,
+    answer_pairs,
+    choose_greedily,
+    present_and_planned,
+    realized_log_bayes_factors,
+)
 from rrru.diagnosis.design.run_limits import RunLimits, StatedLimits, run_limits
 from rrru.diagnosis.inference import InferenceResult
 from rrru.diagnosis.make_problem import make_diagnosis_problem
@@ -70,23 +76,23 @@ def advise(
     stated: StatedLimits of the robot, by default none; sizes: by effect the rms in mm of its part of the gap. Runs that
     decide what matters most come first.
     """
-    contests = contests_of(inference, verdict, sizes or {})
-    if not contests:
+    pairs = answer_pairs(inference, verdict, sizes or {})
+    if not pairs:
         return NOTHING
     stated = stated or StatedLimits()
     limits, limited = run_limits(inference.problem, masses, stated)
-    result = _runs(inference, contests, masses, limits)
-    seen = [_realized(inference, contest, result, number) for number, contest in enumerate(contests)]
-    result = [_as_realized(row, seen[row["contest"]]) for row in result]
-    first, listed = [row for row in result if row["contest"] == 0], NOTHING.poses
+    result = _runs(inference, pairs, masses, limits)
+    seen = [_realized(inference, pair, result, number) for number, pair in enumerate(pairs)]
+    result = [_as_realized(row, seen[row["pair"]]) for row in result]
+    first, listed = [row for row in result if row["pair"] == 0], NOTHING.poses
     if not any(row["gain_nats"] > OPTIONS.decisive_gain_nats for row in first):
-        row, listed = _poses(inference, contests[0], masses, limits)
+        row, listed = _poses(inference, pairs[0], masses, limits)
         row = [_as_realized(one, seen[0]) for one in row]
         result, first = result + row, first + row
-    runs = pd.DataFrame(result, columns=["contest", *_COLUMNS])
+    runs = pd.DataFrame(result, columns=["pair", *_COLUMNS])
     runs = runs[runs["gain_nats"] > OPTIONS.min_run_gain_nats]
-    # decisive runs first, those of the most important contest before others; then the most informative ones
-    turn = runs["contest"].where(runs["gain_nats"] > OPTIONS.decisive_gain_nats, len(contests))
+    # decisive runs first, those of the most important pair before others; then the most informative ones
+    turn = runs["pair"].where(runs["gain_nats"] > OPTIONS.decisive_gain_nats, len(pairs))
     runs = runs.assign(turn=turn).sort_values(
         ["turn", "gain_nats", "run"], ascending=[True, False, True], kind="stable"
     )
@@ -94,36 +100,36 @@ def advise(
     some_gain = any(row["gain_nats"] > OPTIONS.min_run_gain_nats for row in first)
     open_still = not some_gain and verdict.sure < OPTIONS.min_sure_probability
     listed = listed if (runs["kind"] == "poses").any() else NOTHING.poses
-    undecided = contests[0].separates if open_still else ""
+    undecided = pairs[0].separates if open_still else ""
     return Advice(runs, listed, undecided, limited or (stated.words if open_still else ""))
 
 
-def _runs(inference: InferenceResult, contests: Sequence[Contest], masses: Masses, limits: RunLimits) -> list[Row]:
-    """Rows of `gap_next_runs` of all candidate runs, with the number of the Contest that each is counted for."""
+def _runs(inference: InferenceResult, pairs: Sequence[AnswerPair], masses: Masses, limits: RunLimits) -> list[Row]:
+    """Rows of `gap_next_runs` of all candidate runs, with the number of the AnswerPair that each is counted for."""
     choice, table = candidates(inference.problem.measurements, limits)
     if not choice:
         return []
     planned, result = _planned(inference.problem, table, masses), []
-    for number, contest in enumerate(contests):
-        if not _have_inputs(planned, contest):
+    for number, pair in enumerate(pairs):
+        if not _have_inputs(planned, pair):
             continue
-        now, added = worth(inference, contest.truth, contest.rival, planned)
-        start = now.nats()
+        now, added = present_and_planned(inference, pair.truth, pair.rival, planned)
+        start = now.misfit_nats()
         for run, one in zip(choice, added, strict=True):
-            about = {"contest": number, "separates": contest.separates, "now_nats": start}
-            result.append(run | about | {"gain_nats": (now + one).nats() - start})
+            about = {"pair": number, "separates": pair.separates, "now_nats": start}
+            result.append(run | about | {"gain_nats": (now + one).misfit_nats() - start})
     return result
 
 
 def _realized(
-    inference: InferenceResult, contest: Contest, rows: Sequence[Row], number: int
+    inference: InferenceResult, pair: AnswerPair, rows: Sequence[Row], number: int
 ) -> tuple[float, dict[str, float]]:
     """Share of the expected gain that the last run along a trajectory driven before has added, at most 1.
 
     1 where it was not expected to decide. And the expected gain of a plain repetition by trajectory; number: of the
-    Contest among rows of `_runs`.
+    AnswerPair among rows of `_runs`.
     """
-    again = [row for row in rows if row["contest"] == number and row["run"] == f"{row['trajectory']} {_AGAIN}"]
+    again = [row for row in rows if row["pair"] == number and row["run"] == f"{row['trajectory']} {_AGAIN}"]
     expected = {row["trajectory"]: row["gain_nats"] for row in again}
     frame = inference.problem.measurements[inference.problem.used]
     driven = frame.groupby("run", sort=False)["trajectory"].first().astype(str)
@@ -136,7 +142,7 @@ def _realized(
     if not whole > OPTIONS.decisive_gain_nats:
         return 1.0, expected
     # evidence for either answer counts
-    found = abs(realized(inference, contest.truth, contest.rival).get(run, np.inf))
+    found = abs(realized_log_bayes_factors(inference, pair.truth, pair.rival).get(run, np.inf))
     return float(min(found / whole, 1.0)), expected
 
 
@@ -161,14 +167,14 @@ def _planned(problem: DiagnosisProblem, table: pd.DataFrame, masses: Masses) -> 
     )
 
 
-def _have_inputs(planned: DiagnosisProblem, contest: Contest) -> bool:
-    """Whether planned runs have what the effects of a Contest need, such as times or temperatures."""
-    answers = contest.truth, contest.rival
+def _have_inputs(planned: DiagnosisProblem, pair: AnswerPair) -> bool:
+    """Whether planned runs have what the effects of an AnswerPair need, such as times or temperatures."""
+    answers = pair.truth, pair.rival
     return all(term.effect in planned.library for hypothesis, _ in answers for term in hypothesis.terms)
 
 
 def _poses(
-    inference: InferenceResult, contest: Contest, masses: Masses, limits: RunLimits
+    inference: InferenceResult, pair: AnswerPair, masses: Masses, limits: RunLimits
 ) -> tuple[list[Row], pd.DataFrame]:
     """The row of poses of `gap_next_runs` in a list, which is empty where there are none, and `gap_next_poses`.
 
@@ -182,7 +188,7 @@ def _poses(
     stated_speed, own_load = (float(problem.measurements[name].median()) for name in ("speed_mm_s", "payload_kg"))
     own_speed = stated_speed if np.isfinite(stated_speed) else _speed(problem.measurements)
     last_s, own_load, most = _end_s(problem.measurements), float(np.nan_to_num(own_load)), 0.0
-    for fast, loaded in _harder(problem, contest):
+    for fast, loaded in _harder(problem, pair):
         speed = limits.fast(stated_speed, np.full(1, np.nan)) if fast else own_speed
         load = limits.loaded_kg(own_load) if loaded else own_load
         if (fast and not (speed > stated_speed and np.isfinite(last_s))) or (loaded and not load > own_load):
@@ -193,30 +199,30 @@ def _poses(
             continue
         table = some.commands(problem.mechanism, last_s + OPTIONS.pause_between_runs_s, speed, load)
         planned = _planned(problem, table, masses)
-        if not _have_inputs(planned, contest):
+        if not _have_inputs(planned, pair):
             continue
-        now, added = worth(inference, contest.truth, contest.rival, planned)
-        chosen, _ = greedy(now, added, OPTIONS.max_advised_poses)
+        now, added = present_and_planned(inference, pair.truth, pair.rival, planned)
+        chosen, _ = choose_greedily(now, added, OPTIONS.max_advised_poses)
         chosen = chosen[: some.within(chosen, speed, limits.seconds)]
         if not chosen:
             continue
-        gain = sum((added[number] for number in chosen), now).nats() - now.nats()
+        gain = sum((added[number] for number in chosen), now).misfit_nats() - now.misfit_nats()
         # a higher payload or speed has to be clearly more informative
         if gain > OPTIONS.min_gain_ratio_of_harder_poses * most:
             count, most = len(chosen), gain
             words = " ".join([f"{count} poses", *_how(fast, loaded, speed, load)]), "poses", "poses", False
-            row = *words, speed, load, count * OPTIONS.points_per_pass, contest.separates, now.nats(), gain
+            row = *words, speed, load, count * OPTIONS.points_per_pass, pair.separates, now.misfit_nats(), gain
             listed = some.listed(chosen).assign(speed_mm_s=speed, payload_kg=load)
-            best = [{"contest": 0, **dict(zip(_COLUMNS, row, strict=True))}], listed
+            best = [{"pair": 0, **dict(zip(_COLUMNS, row, strict=True))}], listed
     return best
 
 
-def _harder(problem: DiagnosisProblem, contest: Contest) -> Iterator[tuple[bool, bool]]:
-    """Whether passes are faster, and whether they are with a higher payload, as far as an effect of a Contest differs.
+def _harder(problem: DiagnosisProblem, pair: AnswerPair) -> Iterator[tuple[bool, bool]]:
+    """Whether passes are faster, and whether they have a higher payload, as far as an effect of an AnswerPair differs.
 
     Passes at which every effect is the same as at others decide no more than these.
     """
-    terms = [term for hypothesis, _ in (contest.truth, contest.rival) for term in hypothesis.terms]
+    terms = [term for hypothesis, _ in (pair.truth, pair.rival) for term in hypothesis.terms]
     needs = {need for term in terms for need in problem.library[term.effect].needs}
     by_speed, by_load = needs - _ALIKE_AT_ANY_SPEED, needs & {*LOADS, "payload_kg"}
     return product((False, True) if by_speed else (False,), (False, True) if by_load else (False,))

@@ -235,7 +235,7 @@ def test_orientations_that_turn_otherwise_than_the_platform_are_refused(
 ):
     """A noise of some degrees was found in their place, and a cause was named with 0.99."""
     table, options = change(_file(arm, driven, registered=registered)), {} if registered else {"targets": {}}
-    with pytest.raises(IngestError, match=f"in the median from a fixed turn.*{advice}"):
+    with pytest.raises(IngestError, match=f"in the median from those of the platform times a fixed rotation.*{advice}"):
         _taken(tmp_path, table, arm, frame="register" if registered else "robot", **options)
 
 

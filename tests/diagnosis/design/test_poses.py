@@ -11,7 +11,7 @@ from rrru.campaign.ingest.spec import IngestSpec
 from rrru.diagnosis.calibrate import calibrate
 from rrru.diagnosis.design import poses
 from rrru.diagnosis.design.advise import advise
-from rrru.diagnosis.design.expected_information import Sums, greedy, reachable
+from rrru.diagnosis.design.expected_information import NormalEquations, choose_greedily, without_unreachable
 from rrru.diagnosis.design.run_limits import StatedLimits
 from rrru.diagnosis.inference import InferenceResult
 from rrru.diagnosis.make_problem import make_diagnosis_problem
@@ -51,7 +51,9 @@ def _left(parts):
 @pytest.mark.parametrize("seed", range(5))
 def test_each_pose_is_the_best_one_after_those_before_it(seed):
     first, *others = _candidates(seed)
-    chosen, gain = greedy(Sums.of(*first, _NOISE_MM), [Sums.of(*one, _NOISE_MM) for one in others], 3)
+    chosen, gain = choose_greedily(
+        NormalEquations.of(*first, _NOISE_MM), [NormalEquations.of(*one, _NOISE_MM) for one in others], 3
+    )
     taken = [first]
     for number in chosen:
         gains = [-np.inf if any(one is t for t in taken) else _left([*taken, one]) for one in others]
@@ -64,11 +66,13 @@ def test_each_pose_is_the_best_one_after_those_before_it(seed):
 
 def test_further_points_never_take_information_away():
     first, *others = _candidates(9, 200)
-    now = Sums.of(*first, _NOISE_MM)
-    assert min((now + Sums.of(*one, _NOISE_MM)).nats() for one in others) >= now.nats()
+    now = NormalEquations.of(*first, _NOISE_MM)
+    assert min((now + NormalEquations.of(*one, _NOISE_MM)).misfit_nats() for one in others) >= now.misfit_nats()
     # data that the design itself can fit have no information
     made = others[0][0], others[0][0] @ np.ones(4)
-    assert (Sums.of(*made, _NOISE_MM) + Sums.of(*made, _NOISE_MM)).nats() == pytest.approx(0.0, abs=1e-6)
+    assert (NormalEquations.of(*made, _NOISE_MM) + NormalEquations.of(*made, _NOISE_MM)).misfit_nats() == pytest.approx(
+        0.0, abs=1e-6
+    )
 
 
 def test_passes_lie_between_measured_points_within_reach():
@@ -254,10 +258,10 @@ def test_points_at_which_the_corrected_model_has_no_pose_are_left_out_of_what_ru
     assert 0 < posed.sum() < len(posed)
     with pytest.raises(FitError, match="no pose"):
         problem.linearise(state, [])
-    reached = reachable(problem, state)
+    reached = without_unreachable(problem, state)
     assert reached.count == posed.sum()
     assert np.isfinite(reached.linearise(state, []).data).all()
-    assert reachable(problem, plain) is problem
+    assert without_unreachable(problem, plain) is problem
 
 
 def test_a_box_smaller_than_a_pass_has_none():

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rrru.diagnosis.design.expected_information import contests_of
+from rrru.diagnosis.design.expected_information import answer_pairs
 from rrru.diagnosis.hypothesis import Hypothesis
 from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.posterior import Posterior
@@ -12,7 +12,7 @@ from rrru.diagnosis.verdict import Group, Verdict
 
 
 class _Attribution:
-    """What contests are found from: a posterior of sets of effects with probabilities."""
+    """What pairs are found from: a posterior of sets of effects with probabilities."""
 
     def __init__(self, sets):
         hypotheses = tuple(
@@ -24,11 +24,11 @@ class _Attribution:
 
 def _contests(sets, sizes=None, **verdict):
     defaults = {"effects": (), "unexplained": False, "probability": 0.5, "leg": 0, "possible": (), "rivals": ()}
-    return contests_of(_Attribution(sets), Verdict(**(defaults | verdict)), sizes or {})
+    return answer_pairs(_Attribution(sets), Verdict(**(defaults | verdict)), sizes or {})
 
 
-def _names(contest):
-    return [{term.effect for term in answer[0].terms} for answer in (contest.truth, contest.rival)]
+def _names(pair):
+    return [{term.effect for term in answer[0].terms} for answer in (pair.truth, pair.rival)]
 
 
 def test_members_of_a_group_come_first_each_in_the_place_of_the_most_probable():
@@ -62,8 +62,8 @@ def test_the_uncertain_cause_that_makes_most_of_the_gap_comes_before_nearer_riva
 
 
 def test_the_answer_with_more_effects_makes_the_data():
-    (contest,) = _contests({("a",): 0.5, ("a", "b"): 0.5}, effects=("a",), possible=("b",))
-    assert contest.separates == "a / a+b" and _names(contest) == [{"a", "b"}, {"a"}]
+    (pair,) = _contests({("a",): 0.5, ("a", "b"): 0.5}, effects=("a",), possible=("b",))
+    assert pair.separates == "a / a+b" and _names(pair) == [{"a", "b"}, {"a"}]
 
 
 def test_with_something_unexplained_a_group_alone_is_contested():
