@@ -213,7 +213,18 @@ def test_a_stated_noise_of_zero_is_no_noise_and_noted():
     assert not [*noise_notes(SimpleNamespace(noise_mm=0.021), None, 2.0)]
 
 
-@pytest.mark.parametrize("noise", [{"noise_mm": -0.02}, {"noise_rad": 0.0}, {"noise_rad": -1e-4}])
-def test_a_noise_that_no_instrument_has_is_refused(noise):
-    with pytest.raises(ConfigError, match=f"{next(iter(noise))} is {next(iter(noise.values()))}; allowed: a positive"):
-        MeasuredRobot(campaigns.MODEL, **noise)
+@pytest.mark.parametrize(
+    ("name", "value", "allowed"),
+    [
+        ("noise_mm", -0.02, "0 or more"),
+        ("noise_rad", 0.0, "a positive number"),
+        ("noise_rad", -1e-4, "a positive number"),
+    ],
+)
+def test_a_noise_that_no_instrument_has_is_refused(name, value, allowed):
+    with pytest.raises(ConfigError, match=f"{name} is {value}; allowed: {allowed}, or None where it is unknown"):
+        MeasuredRobot(campaigns.MODEL, **{name: value})
+
+
+def test_a_stated_noise_of_zero_is_allowed():
+    assert MeasuredRobot(campaigns.MODEL, noise_mm=0.0).noise_mm == 0.0

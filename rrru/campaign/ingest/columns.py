@@ -86,16 +86,13 @@ def resolve(
         if ours not in found and ((ours in REQUIRED and not (only_drives and ours in COMMAND)) or ours in spec.columns):
             allowed = f"a column {theirs}{_advice(ours, _nearest(theirs, extra))}; the file has {', '.join(names)}"
             problems.add("missing column", column=theirs, value="no such column", allowed=allowed)
-    given = ", ".join(found[name] for name in drives if name in found)
-    if 0 < sum(name in found for name in drives) < len(drives):
-        allowed = f"all of {', '.join(drives)}, or none"
-        problems.add("missing column", column=given, value=f"some {drive_name(mechanism)}", allowed=allowed)
-    for group in _GROUPS:
-        given = ", ".join(found[name] for name in group if name in found)
-        if 0 < sum(name in found for name in group) < len(group):
+    groups = [(tuple(drives), f"some {drive_name(mechanism)}")]
+    groups += [(group, "a part of the noise" if group is NOISE else "a part of an orientation") for group in _GROUPS]
+    for group, part in groups:
+        given = [found[name] for name in group if name in found]
+        if 0 < len(given) < len(group):
             allowed = f"all of {', '.join(group)}, or none"
-            part = "a part of the noise" if group is NOISE else "a part of an orientation"
-            problems.add("missing column", column=given, value=part, allowed=allowed)
+            problems.add("missing column", column=", ".join(given), value=part, allowed=allowed)
     if spec.extra_columns == "refuse":
         unused = [ours for ours in wanted if ours not in found]
         meant = {theirs: ours for ours, theirs in (guessed or {}).items()}
