@@ -460,13 +460,13 @@ def _left(facts: Facts) -> list[str]:
 def _open(facts: Facts) -> list[str]:
     """What else may act: the named rivals, and what the advised runs would decide."""
     named = [effect["name"] for effect in facts["effects"]]
-    contests = [_apart(run["separates"]) for run in facts["next"]]
-    asked = dict.fromkeys(name for sides in contests for name in sorted(set().union(*sides)))
+    pairs = [_apart(run["separates"]) for run in facts["next"]]
+    asked = dict.fromkeys(name for sides in pairs for name in sorted(set().union(*sides)))
     # groups have a sentence of their own
     grouped = [name for group in facts["groups"] for name in group["names"]]
     others = dict.fromkeys(name for name in [*facts["confounded_with"], *asked] if name not in [*named, *grouped])
     listed = [_OUTSIDE.get(name, readable(name)) for name in others]
-    uncertain = {name for sides in contests if not all(sides) for name in set().union(*sides)}
+    uncertain = {name for sides in pairs if not all(sides) for name in set().union(*sides)}
     listed += [f"that {readable(name)} does not act" for name in named if name in uncertain]
     if not listed:
         return []

@@ -22,7 +22,7 @@ class _Attribution:
         self.posterior = Posterior(hypotheses, weights, np.zeros(weights.shape, dtype=bool))
 
 
-def _contests(sets, sizes=None, **verdict):
+def _pairs_of(sets, sizes=None, **verdict):
     defaults = {"effects": (), "unexplained": False, "probability": 0.5, "leg": 0, "possible": (), "rivals": ()}
     return answer_pairs(_Attribution(sets), Verdict(**(defaults | verdict)), sizes or {})
 
@@ -33,7 +33,7 @@ def _names(pair):
 
 def test_members_of_a_group_come_first_each_in_the_place_of_the_most_probable():
     sets = {("a", "b"): 0.4, ("a", "c"): 0.3, ("a", "d"): 0.2, ("b",): 0.1}
-    found = _contests(
+    found = _pairs_of(
         sets,
         effects=("a", "b"),
         groups=(Group(("b", "c", "d"), 0.99),),
@@ -45,9 +45,9 @@ def test_members_of_a_group_come_first_each_in_the_place_of_the_most_probable():
 
 def test_a_member_whose_exact_set_was_never_weighed_stands_with_the_best_set_that_holds_it():
     sets = {("a", "b"): 0.5, ("c", "e"): 0.3, ("a",): 0.2}
-    (first, *_) = _contests(sets, effects=("a", "b"), groups=(Group(("b", "c"), 0.9),))
+    (first, *_) = _pairs_of(sets, effects=("a", "b"), groups=(Group(("b", "c"), 0.9),))
     assert first.separates == "a+b / c+e"
-    assert _contests({("b", "c"): 0.5, ("c", "e"): 0.5}, effects=("b",), groups=(Group(("b", "f"), 0.9),)) == []
+    assert _pairs_of({("b", "c"): 0.5, ("c", "e"): 0.5}, effects=("b",), groups=(Group(("b", "f"), 0.9),)) == []
 
 
 @pytest.mark.parametrize(
@@ -57,21 +57,21 @@ def test_the_uncertain_cause_that_makes_most_of_the_gap_comes_before_nearer_riva
     """Without a cause that is named its rival is what is then the most probable."""
     sets = {("a", "b"): 0.5, ("a", "b", "d"): 0.15, ("a",): 0.1, ("a", "e"): 0.25}
     rivals = ((frozenset("ae"), False, 0.25), (frozenset("a"), False, 0.1))
-    found = _contests(sets, sizes, effects=("a", "b"), possible=("e", "d", "none"), rivals=rivals)
+    found = _pairs_of(sets, sizes, effects=("a", "b"), possible=("e", "d", "none"), rivals=rivals)
     assert [one.separates for one in found] == list(dict.fromkeys([first, "a+b / a+e", "a+b / a"]))
 
 
 def test_the_answer_with_more_effects_makes_the_data():
-    (pair,) = _contests({("a",): 0.5, ("a", "b"): 0.5}, effects=("a",), possible=("b",))
+    (pair,) = _pairs_of({("a",): 0.5, ("a", "b"): 0.5}, effects=("a",), possible=("b",))
     assert pair.separates == "a / a+b" and _names(pair) == [{"a", "b"}, {"a"}]
 
 
 def test_with_something_unexplained_a_group_alone_is_contested():
     sets = {("a", "b"): 0.5, ("a", "c"): 0.4, ("a",): 0.1}
-    found = _contests(sets, effects=("a", "b"), unexplained=True, groups=(Group(("b", "c"), 0.9),), possible=("none",))
+    found = _pairs_of(sets, effects=("a", "b"), unexplained=True, groups=(Group(("b", "c"), 0.9),), possible=("none",))
     assert [one.separates for one in found] == ["a+b / a+c"]
-    assert _contests(sets, effects=("a",), unexplained=True, possible=("b",)) == []
+    assert _pairs_of(sets, effects=("a",), unexplained=True, possible=("b",)) == []
 
 
 def test_nothing_is_contested_where_all_is_certain():
-    assert _contests({("a",): 0.99, (): 0.01}, effects=("a",), sure=0.99) == []
+    assert _pairs_of({("a",): 0.99, (): 0.01}, effects=("a",), sure=0.99) == []
