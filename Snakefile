@@ -1,8 +1,8 @@
 from pathlib import Path
 
-from snakemake.utils import min_version, validate
+from snakemake.utils import min_version
 
-from rrru.pipeline.checks import check_keys, check_once, check_schema
+from rrru.pipeline.checks import check_keys, check_once, check_schema, set_defaults
 from rrru.pipeline.read_config import SCHEMA
 
 min_version("9.0")
@@ -15,8 +15,7 @@ configfile: "config.yaml"
 
 check_keys(workflow.configfiles)
 check_schema(config, SCHEMA)
-# it sets what is absent to the defaults
-validate(config, str(SCHEMA))
+set_defaults(config, SCHEMA)
 
 
 include: "workflow/rules/pipeline/common.smk"

@@ -35,7 +35,11 @@ class IngestError(RrruError):
         super().__init__("\n".join(_problem_text(p) for p in self.problems))
 
 
-class MistakeError(IngestError):
+class GrossFileError(IngestError):
+    """A measurement file is refused in any frame of the instrument: its units are wrong, or it is of another robot."""
+
+
+class MistakeError(GrossFileError):
     """A measurement file is refused for a mistake that explains it in any units and any frame of the instrument."""
 
 

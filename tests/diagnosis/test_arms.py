@@ -221,7 +221,7 @@ def test_a_link_that_grows_alone_is_told_from_a_robot_that_grows(grown):
     position += arms.NOISE_MM * np.random.default_rng(7).standard_normal(position.shape)
     frame = frame.assign(**rows.vector_columns("measured", position))
     settings = GapSettings(("thermal_growth", "link_growth", "base_drift", "encoder_eccentricity"), draws=20)
-    found = diagnose(frame, MeasuredRobot(arms.reading(frame), arms.MASSES, arms.NOISE_MM), settings)
+    found = diagnose(frame, MeasuredRobot(arms.reading(frame), arms.MASSES, arms.NOISE_MM), settings, details=False)
     name, parameter = ("link_growth", "strain2") if len(grown) == 1 else ("thermal_growth", "strain")
     assert found.verdict["effects"] == name
     numbers = found.tables["gap_parameters"].query("effect == @name").set_index("parameter")
@@ -256,7 +256,8 @@ def test_a_zero_that_moves_is_that_drives_whatever_else_changes_with_time(law, j
     twists = arms.ARM.twists_of(arms.ERRORS)
     position = arms.ARM.measured(arms.ARM.solve(stands, arms.ARM.forward(stands), twists), twists)
     frame = frame.assign(**rows.vector_columns("measured", position + 0.02 * generator.standard_normal((count, 3))))
-    found = diagnose(frame, MeasuredRobot(arms.reading(frame), arms.MASSES, 0.02), GapSettings(draws=20))
+    robot = MeasuredRobot(arms.reading(frame), arms.MASSES, 0.02)
+    found = diagnose(frame, robot, GapSettings(draws=20), details=False)
     if law == "slip":
         assert set(found.verdict["effects"].split("+")) <= {"zero_drift", "unexplained"}
         assert found.tables["gap_remainder"]["follows"].iloc[0] == f"the time, as a zero offset of joint {joint}"

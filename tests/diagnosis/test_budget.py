@@ -23,7 +23,7 @@ from tests.diagnosis.campaigns import (
 
 def _budget(frame, noise_mm=NOISE_MM):
     """The table of a diagnosis by part, and the diagnosis."""
-    found = diagnosed(frame, noise_mm, details=True)
+    found = diagnosed(frame, noise_mm)
     return found.tables["gap_budget"].set_index("part"), found
 
 
@@ -102,7 +102,7 @@ def test_whoever_does_not_know_the_weight_still_knows_what_gives_way_in_all():
     known = {"weight": {"extra_kg": 0.0, "lean_x": 0.0, "lean_y": 0.0}}
     shares, errors = [], []
     for settings in (GapSettings(draws=400), GapSettings(draws=400, known=known)):
-        tables = diagnosed(frame, details=True, settings=settings).tables
+        tables = diagnosed(frame, settings=settings).tables
         own = tables["gap_budget"].set_index("part").loc["drive_compliance"]
         shares.append(own["share_high"] - own["share_low"])
         errors.append(tables["gap_parameters"].query("effect == 'drive_compliance'")["standard_error"].mean())

@@ -98,7 +98,7 @@ def test_a_tracker_that_drifts_to_and_fro_is_unexplained_and_said_to_follow_the_
     passed = 2.0 * frame["time_s"] / frame["time_s"].max() - 1.0
     frame["measured_z_mm"] += 0.15 * passed**2
     frame["measured_x_mm"] -= 0.08 * (4.0 * passed**3 - 3.0 * passed)
-    found = diagnosed(frame, details=True)
+    found = diagnosed(frame)
     assert found.verdict["effects"] == "unexplained"
     best = found.tables["gap_remainder"].iloc[0]
     assert best["follows"] == "the time" and best["explained"] > 0.9

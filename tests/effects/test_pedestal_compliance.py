@@ -112,7 +112,7 @@ def test_the_diagnosis_names_the_pedestal(found):
     used = table[rows.usable(table)]
     robot = robot.with_identifiable_parameters(rows.actuators(used, robot), rows.command(used), rows.readings(used))
     names = ("drive_compliance", "encoder_eccentricity", "pedestal_compliance")
-    result = diagnose(table, MeasuredRobot(robot, _NOTHING, 0.01), GapSettings(names, draws=10))
+    result = diagnose(table, MeasuredRobot(robot, _NOTHING, 0.01), GapSettings(names, draws=10), details=False)
     assert result.verdict["effects"] == "pedestal_compliance" and result.verdict["where"] == "world"
     (values,) = result.state.effects.values()
     np.testing.assert_allclose(values, [*_VALUES.values()], rtol=0.15)

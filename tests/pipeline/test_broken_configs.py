@@ -15,7 +15,7 @@ from snakemake.utils import update_config, validate
 
 from rrru.errors import ConfigError
 from rrru.pipeline import config as parts
-from rrru.pipeline.checks import check_schema
+from rrru.pipeline.checks import check_schema, set_defaults
 from rrru.studies.ptt3 import parts as ptt
 from rrru.studies.rrru3 import settings as paper_a
 from tests.broken import COUNT, EDITS, counted, edited, many
@@ -37,13 +37,24 @@ def _base():
 def _asked(config):
     """What the Snakefile asks."""
     check_schema(config, SCHEMA)
-    # sets the defaults; whatever it refuses, the stricter one has refused
-    validate(config, str(SCHEMA))
+    # whatever it refuses, the stricter one has refused
+    set_defaults(config, SCHEMA)
     for check in (parts.check_files, ptt.check, paper_a.check):
         check(config)
     for name in CHECKS:
         module, _, function = name.partition(":")
         getattr(importlib.import_module(module), function)(config)
+
+
+def test_defaults_are_those_that_snakemake_sets():
+    """Those of the schema, nested ones too."""
+    config = _base()
+    config["campaigns"]["paper"]["passes"] = [{}]
+    config["virtual_robots"]["mine"] = {"axis_errors": {}}
+    expected = copy.deepcopy(config)
+    validate(expected, str(SCHEMA))
+    set_defaults(config, SCHEMA)
+    assert config == expected and config["campaigns"]["paper"]["passes"] == [{"reverse": False, "payload_kg": 0.0}]
 
 
 def test_a_broken_configuration_is_taken_or_refused(monkeypatch):

@@ -31,7 +31,7 @@ from rrru.campaign.ingest.sheet import COMMAND, MEASURED, NOISE, TARGET, TURNS, 
 from rrru.campaign.ingest.spec import MM, IngestSpec
 from rrru.campaign.ingest.target_placement import TargetPlacement, check_turned, places_instead, target_placement
 from rrru.campaign.measurements import command, measured, turn_columns, turns, vector_columns
-from rrru.errors import ConfigError, FitError, IngestError, MistakeError
+from rrru.errors import ConfigError, FitError, GrossFileError, MistakeError
 from rrru.kinematics.robot import Robot
 
 
@@ -173,7 +173,7 @@ def _refuse(sheet: Sheet, gross: GrossError, driven: bool) -> None:
     concerned = sheet.drives if driven and not gross.mistakes.of_readings else MEASURED
     # other units have been tried along with all other mistakes, and the instrument's frame is registered
     explained = gross.limit_mm is None and not gross.mistakes.of_units
-    sheet.refuse_now(concerned, value, allowed, MistakeError if explained else IngestError)
+    sheet.refuse_now(concerned, value, allowed, MistakeError if explained else GrossFileError)
 
 
 def _at_tool(sheet: Sheet, mounted: TargetPlacement | None) -> Sheet:

@@ -22,7 +22,7 @@ from rrru.campaign.ingest.problems import Problems
 from rrru.campaign.ingest.sheet import COMMAND
 from rrru.campaign.ingest.spec import MM, RAD, IngestSpec
 from rrru.campaign.stated_motion import STOP_AND_GO
-from rrru.errors import IngestError, MistakeError, Problem, RrruError
+from rrru.errors import GrossFileError, IngestError, MistakeError, Problem, RrruError
 from rrru.kinematics.robot import Robot
 from rrru.pipeline import config as parts
 from rrru.pipeline import setup
@@ -162,13 +162,20 @@ def _fitting(section: Section, cells: Cells, mechanism: Robot) -> Proposal:
     choices |= {key: tuple(dict.fromkeys((unit, *choices[key]))) for key, unit in guessed.items()}
     open_choices = [((section[key],) if key in section else values) for key, values in choices.items()]
     attempts: list[Proposal] = []
-    for values in product(*open_choices):
+    # units in which a file is refused whatever its frame is
+    refused = set()
+    for frame, *units in product(*open_choices):
+        if tuple(units) in refused:
+            continue
+        values = frame, *units
         chosen = dict(zip(choices, values, strict=True))
         stated = section | {key: value for key, value in chosen.items() if key in section or value != usual[key]}
         try:
             return Proposal(stated, cells, mechanism, ingest(IngestSpec.from_config(stated), mechanism), ())
         except IngestError as error:
             attempts.append(Proposal(stated, cells, mechanism, None, error.problems))
+            if isinstance(error, GrossFileError):
+                refused.add(tuple(units))
             if isinstance(error, MistakeError) or all(problem["row"] is not None for problem in error.problems):
                 break
     return min(attempts, key=lambda attempt: _of_all_rows(attempt.refused))

@@ -10,6 +10,7 @@ import json
 import warnings
 from collections import Counter
 from dataclasses import dataclass
+from functools import cache
 from itertools import combinations, pairwise
 from time import perf_counter
 
@@ -144,6 +145,12 @@ def spike_and_slab(campaign, generator):
     basis, _ = np.linalg.qr(campaign.base)
     unit = _unit(np.concatenate(list(campaign.columns.values()), axis=1), campaign.base)
     gram, moment = unit.T @ unit, unit.T @ (campaign.data - basis @ (basis.T @ campaign.data))
+
+    @cache
+    def marginal(*chosen):
+        """Most states of the sampler recur."""
+        return _marginal(gram, moment, numbers, chosen)
+
     choices = {}
     for number, term in enumerate(terms):
         choices.setdefault(term.effect, []).append(number)
@@ -152,14 +159,14 @@ def spike_and_slab(campaign, generator):
         for effect, terms_of_effect in choices.items():
             others = [term for name, term in state.items() if name != effect]
             slab = state[effect][1] if effect in state else generator.choice(_SLABS)
-            log = [_marginal(gram, moment, numbers, [*others, (number, slab)]) for number in terms_of_effect]
-            log_without = _marginal(gram, moment, numbers, others) + np.log(len(terms_of_effect) * (1.0 / _ACTS - 1.0))
+            log = [marginal(*others, (number, slab)) for number in terms_of_effect]
+            log_without = marginal(*others) + np.log(len(terms_of_effect) * (1.0 / _ACTS - 1.0))
             log = np.array([log_without, *log])
             chosen = _drawn(log, generator)
             state.pop(effect, None)
             if chosen:
                 term = terms_of_effect[chosen - 1]
-                log = [_marginal(gram, moment, numbers, [*others, (term, slab)]) for slab in _SLABS]
+                log = [marginal(*others, (term, slab)) for slab in _SLABS]
                 state[effect] = term, _SLABS[_drawn(np.array(log), generator)]
         if sweep >= _DROPPED:
             found[_label(state)] += 1

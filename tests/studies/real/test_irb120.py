@@ -87,7 +87,7 @@ def _diagnosed(table, effects):
     used = table[rows.usable(table)]
     robot = _robot().with_measurement_config(rows.measurement_config(table, (), True))
     robot = robot.with_identifiable_parameters(rows.actuators(used, robot), rows.command(used), rows.readings(used))
-    return diagnose(table, MeasuredRobot(robot, Masses(0.0, 0.0, 0.0)), GapSettings(effects, draws=50))
+    return diagnose(table, MeasuredRobot(robot, Masses(0.0, 0.0, 0.0)), GapSettings(effects, draws=50), details=False)
 
 
 def test_what_remains_is_named(campaign):
