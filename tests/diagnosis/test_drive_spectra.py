@@ -137,9 +137,9 @@ def test_the_spectrum_that_made_the_data_is_the_likeliest():
     problem = replace(arms.problem_of(arms.measure(count=300)), library={effect.name: effect})
     linear = problem.linearise(calibrate(problem))
     basis, _ = np.linalg.qr(linear.base.reshape(linear.data.size, -1))
-    whole, count = linear.columns[effect.name, 0].reshape(linear.data.size, -1), 2 * len(ORDERS)
+    whole, count = linear.columns[effect.name, 0].reshape(linear.data.size, -1), 1 + 2 * len(ORDERS)
     # low orders of two drives do, and are quick
-    keep = np.concatenate([np.arange(2 * 48), count + np.arange(2 * 48)])
+    keep = np.concatenate([1 + np.arange(2 * 48), count + 1 + np.arange(2 * 48)])
     columns = whole[:, keep] - basis @ (basis.T @ whole[:, keep])
     spectra, hits, draws = [one[keep] for one in effect.coordinates.spectra], 0, 0
     roots, several = [[np.diag(own) for own in np.split(size, 2)] for size in spectra], [False] * len(spectra)
