@@ -15,7 +15,13 @@ from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.problem import DiagnosisProblem
 from rrru.diagnosis.terms import EffectTerm, signatures
 from rrru.diagnosis.whitened import discrepancy_scales, spectrum
-from rrru.estimation.cross_validation import ComplementFit, choose_folds, complement_fits
+from rrru.estimation.cross_validation import (
+    ComplementFit,
+    choose_folds,
+    complement_fits,
+    left_out_spread,
+    whole_fit,
+)
 from rrru.estimation.noise_model import half_waves, lengths
 
 
@@ -111,6 +117,21 @@ class HeldOut:
                 spread[out] = fit.half(together[out].reshape(-1, len(fit.mean))).T.reshape(-1, 3, len(fit.mean))
         return Prediction(residual, spread, self._left(level), self.problem.series if self._whole_runs else None)
 
+    def spread_at_new_stops(
+        self, terms: Sequence[EffectTerm], prior_scales: Sequence[float] | FloatArray, level: int
+    ) -> FloatArray:
+        """`Prediction.spread` (n, 3, k) for the fit of all readings, at stops that are none of its own.
+
+        Each stop is predicted from all others: from four fifths of them the fit is less certain than the one that is
+        used. Where folds are whole runs, it is the spread of their predictions.
+        """
+        if self._whole_runs:
+            return self.predict(terms, prior_scales, level).spread
+        fit, size = whole_fit(*self._system(terms, prior_scales, level)), np.sqrt(self._left(level))[..., None]
+        together = np.concatenate(self._blocks(terms), axis=-1) / size
+        spread = fit.half(together.reshape(-1, len(fit.mean))).T.reshape(together.shape)
+        return np.asarray(size * left_out_spread(spread, self.problem.stop))
+
     def gains(self, terms: Sequence[EffectTerm], prior_scales: Sequence[float] | FloatArray, level: int) -> list[float]:
         """Log predictive score that each of the terms adds to that of the others, at these prior scales.
 
@@ -154,6 +175,15 @@ class HeldOut:
         self, terms: Sequence[EffectTerm], prior_scales: Sequence[float] | FloatArray, level: int
     ) -> dict[int, ComplementFit]:
         """ComplementFit of calibration and terms by the number of the fold that is left out."""
+        white, precision, moment = self._system(terms, prior_scales, level)
+        return complement_fits(white, self.fold, precision, moment)
+
+    def _system(
+        self, terms: Sequence[EffectTerm], prior_scales: Sequence[float] | FloatArray, level: int
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Whitened columns (n, 3, k + 1) of calibration and terms, the data last; precision and moment (k,) of their
+        priors.
+        """
         linear, count = self.evidence.linear, self.evidence.linear.base.shape[-1]
         sd, mean = linear.base_prior or (np.full(count, np.inf), np.zeros(count))
         precision = np.concatenate([sd, self.evidence.scales(terms, prior_scales)]) ** -2.0
@@ -162,8 +192,7 @@ class HeldOut:
         together = np.concatenate([*self._blocks(terms), linear.data[..., None]], axis=-1)
         if self._whole_runs:
             together, _ = along_runs(together, self.problem.series)
-        white = together / np.sqrt(self._left(level))[..., None]
-        return complement_fits(white, self.fold, precision, moment)
+        return together / np.sqrt(self._left(level))[..., None], precision, moment
 
     @cached_property
     def _whole_runs(self) -> bool:
