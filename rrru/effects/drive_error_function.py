@@ -13,10 +13,10 @@ normal. This is a Gaussian process on the circle. Their standard deviation is in
     1 / sqrt(1 + (n / b)^4)    with corners
     exp(-(n / b)^2 / 2)        smooth
 
-with waves up to about b per turn, with steps to order 128, else to 64. The function is zero at the value at which the drive
-was zeroed, which is not known: the constant c_i0 has the standard deviation of the sum of the waves at one value. It
-cannot be separated from the drive's zero offset, whose interval is wider by it. The likelihood chooses the kind and b among some
-values, for all drives or for one alone. The result is the spectrum of the error. A gear's sharp orders are
+with waves up to about b per turn, with steps to order 128, else to 64. The function is zero at the value at which the
+drive was zeroed, which is not known: the constant c_i0 has the standard deviation of the sum of the waves at one value.
+It cannot be separated from the drive's zero offset, whose interval is wider by it. The likelihood chooses the kind and
+b among some values, for all drives or for one alone. The result is the spectrum of the error. A gear's sharp orders are
 `transmission_error` and `transmission_orders`: where few waves suffice, these have fewer coefficients and a higher
 evidence. Only what the measured range of a drive resolves is fitted.
 

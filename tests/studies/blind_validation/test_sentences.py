@@ -423,7 +423,9 @@ def test_a_compliant_drive_bears_the_load_of_the_robot_where_it_stands():
     np.testing.assert_allclose(off, expected, rtol=1e-4, atol=1e-9)
 
 
-@pytest.mark.parametrize(("name", "kind"), [("gain_error", "polar"), ("lead_error", "polar"), ("lead_error", "hexapod")])
+@pytest.mark.parametrize(
+    ("name", "kind"), [("gain_error", "polar"), ("lead_error", "polar"), ("lead_error", "hexapod")]
+)
 def test_a_wrong_ratio_is_an_error_in_proportion_at_the_drives_of_its_unit(name, kind):
     from rrru.studies.blind_validation.sentences.causes import Stops, draw_cause, fits
     from rrru.studies.blind_validation.sentences.kinds import KINDS
