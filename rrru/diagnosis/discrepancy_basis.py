@@ -40,6 +40,7 @@ class Unknown:
     # capabilities of an `rrru.effects.protocol.Effect` that no function has
     with_waves = None
     switches = False
+    steps = 0.0
 
     @property
     def along_drives(self) -> Callable[[Motion], list[FloatArray]] | None:

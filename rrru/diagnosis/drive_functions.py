@@ -2,7 +2,8 @@
 
 The error e(q) of an effect that depends on the drive's value alone is tabulated over the measured range, minus its mean
 there: a constant is the drive's zero, which the calibration has. With the derivatives s(q) of e(q) by the effect's
-numbers and their covariance C the 95 % band is e(q) +- 1.96 sqrt(s(q)^T C s(q)).
+numbers and their covariance C the 95 % band is e(q) +- 1.96 sqrt(s(q)^T C s(q)). That of a function that may jump
+reaches, between two stops, the values at both, see `rrru.diagnosis.drive_spectra.jumps`.
 """
 
 from collections.abc import Sequence
@@ -12,8 +13,10 @@ import numpy as np
 import pandas as pd
 
 from rrru.arrays import FloatArray
+from rrru.diagnosis.drive_spectra import jumps
 from rrru.diagnosis.inference import InferenceResult
 from rrru.diagnosis.model_fit import ModelFit
+from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.problem import DiagnosisProblem
 from rrru.diagnosis.result_tables import value_steps
 from rrru.diagnosis.terms import EffectTerm, spread
@@ -60,8 +63,18 @@ def _of_drive(problem: DiagnosisProblem, fit: ModelFit, term: EffectTerm, drive:
         return pd.DataFrame()
     variance = np.einsum("nk,kl,nl->n", slopes, fit.effect_covariance(term)[1], slopes)
     half = QUANTILE_95 * np.sqrt(np.maximum(variance, 0.0))
+    low_error, high_error = error - half, error + half
+    if effect.steps and effect.along_drives is not None:
+        coordinates = fit.state.effects[term.effect, term.shape][effect.coordinates.legs == drive + 1]
+        known = effect.along_drives(replace(problem.motion, drive=measured))[drive] @ coordinates
+        mean = (effect.along_drives(motion)[drive] @ coordinates).mean()
+        before, after, share = jumps(value, measured[:, drive], known - mean)
+        # the interval reaches the value beyond a jump where the function has that with a probability of 2.5 %
+        far = effect.steps * np.minimum(share, 1.0 - share) > OPTIONS.interval_quantiles[0]
+        low_error = np.where(far, np.minimum(low_error, np.minimum(before, after) - half), low_error)
+        high_error = np.where(far, np.maximum(high_error, np.maximum(before, after) + half), high_error)
     worst = np.arange(_PLACES) == int(np.abs(error).argmax())
-    columns = {"drive_value": value, "error": error, "low_95": error - half, "high_95": error + half, "worst": worst}
+    columns = {"drive_value": value, "error": error, "low_95": low_error, "high_95": high_error, "worst": worst}
     return pd.DataFrame(columns)
 
 

@@ -68,9 +68,10 @@ def with_spectra(
             continue
         columns, roots = linear.columns[effect.name, 0].reshape(len(data), -1), effect.coordinates.roots
         of_one = effect.coordinates.of_one
-        best, prior_scale, noise, err = likeliest(data, _without(columns, basis), (roots, of_one), basis.shape[1])
+        likely = likeliest(data, _without(columns, basis), (roots, of_one), basis.shape[1])
+        best, prior_scale, noise, err, steps = likely
         by_drive = _visible(columns, roots[best], prior_scale / noise)
-        library[effect.name] = _chosen(effect, by_drive, prior_scale, err)
+        library[effect.name] = replace(_chosen(effect, by_drive, prior_scale, err), steps=steps)
         changed.append((effect.name, 0))
     return replace(problem, library=library), changed
 
@@ -199,9 +200,7 @@ def resolved(effect: Effect, motion: Motion) -> Effect:
     spectra = effect.coordinates.spectra
     if not spectra or effect.along_drives is None:
         return effect
-    low, high = np.nanmin(motion.drive, axis=0), np.nanmax(motion.drive, axis=0)
-    places = low + np.linspace(0.0, 1.0, _PLACES)[:, None] * (high - low)
-    by_drive = effect.along_drives(replace(motion, drive=places))
+    by_drive = effect.along_drives(replace(motion, drive=over_range(motion.drive)))
     ends = np.cumsum([functions.shape[1] for functions in by_drive])[:-1]
     sizes = [np.split(size, ends) for size in spectra]
     mixtures, roots = [], []
@@ -215,6 +214,26 @@ def resolved(effect: Effect, motion: Motion) -> Effect:
         roots.append([_root(seen.T * _rounded(size[k] / most) ** 2 @ seen) for size in sizes])
     changes = {"spectra": (), "roots": tuple(zip(*roots, strict=True))}
     return _mixed(effect, mixtures, changes)
+
+
+def over_range(drive: FloatArray) -> FloatArray:
+    """Values (_PLACES, K) that are even over the range of each drive's values (n, K)."""
+    low, high = np.nanmin(drive, axis=0), np.nanmax(drive, axis=0)
+    return np.asarray(low + np.linspace(0.0, 1.0, _PLACES)[:, None] * (high - low))
+
+
+def jumps(value: FloatArray, known_at: FloatArray, known: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """A function (n,) before and after each of the values (n,), at the next ones (m,) at which it is known, and the
+    probability (n,) that it has changed there if it jumps in between.
+
+    A function that changes by d at once, and at any place alike, has changed at the share u of the way with the
+    probability u: its variance is d^2 u (1 - u).
+    """
+    at, number = np.unique(known_at, return_index=True)
+    known, width = known[number], np.diff(at)
+    left = np.clip(np.searchsorted(at, value, side="right") - 1, 0, len(width) - 1)
+    share = np.clip((value - at[left]) / width[left], 0.0, 1.0)
+    return known[left], known[left + 1], np.asarray(share)
 
 
 def _rounded(sizes: FloatArray) -> FloatArray:
@@ -295,8 +314,9 @@ def likeliest(
     columns: FloatArray,
     spectra: tuple[tuple[tuple[FloatArray, ...], ...], tuple[bool, ...]],
     fitted: int,
-) -> tuple[int, float, float, BoolArray]:
-    """The likeliest spectrum of data (m,): its number, the factor of its sizes, the noise, which drives (K,) err.
+) -> tuple[int, float, float, BoolArray, float]:
+    """The likeliest spectrum of data (m,): its number, the factor of its sizes, the noise, which drives (K,) err, and
+    the probability that a spectrum of one drive alone made them, which has steps.
 
     columns (m, c); spectra: `roots` and `of_one` as of `Coordinates`. All drives together and each one alone are tried,
     whatever is likeliest counts. fitted: number of parameters fitted together with them.
@@ -313,8 +333,10 @@ def likeliest(
             # each drive is as probable as another
             value -= (not its.all()) * np.log(len(by_drive))
             found.append((value, number, factor, noise, np.unique(drive[its])))
-    _, number, factor, noise, erring = max(found, key=lambda one: one[:2])
-    return number, factor, noise, np.isin(np.arange(len(spectra[0][number])), erring)
+    height, number, factor, noise, erring = max(found, key=lambda one: one[:2])
+    weight = np.exp([value - height for value, *_ in found])
+    steps = weight[[spectra[1][one] for _, one, *_ in found]].sum() / weight.sum()
+    return number, factor, noise, np.isin(np.arange(len(spectra[0][number])), erring), float(steps)
 
 
 def _likeliest_factor(gram: FloatArray, moment: FloatArray, square: float, count: int) -> tuple[float, float, float]:

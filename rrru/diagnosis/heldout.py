@@ -1,7 +1,7 @@
 """Cross-validation: what a hypothesis predicts of points that it was not fitted on."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 
@@ -10,12 +10,19 @@ from scipy.linalg import cho_solve, solve_triangular
 
 from rrru.arrays import FloatArray, IntArray
 from rrru.campaign.noise import along_runs
+from rrru.diagnosis.drive_spectra import jumps, over_range
 from rrru.diagnosis.evidence import ModelEvidence
 from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.problem import DiagnosisProblem
-from rrru.diagnosis.terms import EffectTerm, signatures
+from rrru.diagnosis.terms import EffectTerm, signatures, spread
 from rrru.diagnosis.whitened import discrepancy_scales, spectrum
-from rrru.estimation.cross_validation import ComplementFit, choose_folds, complement_fits
+from rrru.estimation.cross_validation import (
+    ComplementFit,
+    choose_folds,
+    complement_fits,
+    left_out_spread,
+    whole_fit,
+)
 from rrru.estimation.noise_model import half_waves, lengths
 
 
@@ -111,6 +118,51 @@ class HeldOut:
                 spread[out] = fit.half(together[out].reshape(-1, len(fit.mean))).T.reshape(-1, 3, len(fit.mean))
         return Prediction(residual, spread, self._left(level), self.problem.series if self._whole_runs else None)
 
+    def spread_at_new_stops(
+        self, terms: Sequence[EffectTerm], prior_scales: Sequence[float] | FloatArray, level: int
+    ) -> FloatArray:
+        """`Prediction.spread` (n, 3, k) for the fit of all readings, at stops that are none of its own.
+
+        Each stop is predicted from all others: from four fifths of them the fit is less certain than the one that is
+        used. Where folds are whole runs, it is the spread of their predictions. As far as a function jumps, which
+        `jumps_mm2` counts between the stops, it is that of the fit at its own stops.
+        """
+        if self._whole_runs:
+            return self.predict(terms, prior_scales, level).spread
+        fit, size = whole_fit(*self._system(terms, prior_scales, level)), np.sqrt(self._left(level))[..., None]
+        together = np.concatenate(self._blocks(terms), axis=-1) / size
+        own = fit.half(together.reshape(-1, len(fit.mean))).T.reshape(together.shape)
+        steps = max((self.evidence.library[term.effect].steps for term in terms), default=0.0)
+        away = left_out_spread(own, self.problem.stop)
+        near, far = ((one**2).sum(axis=(1, 2)) for one in (own, away))
+        share = np.sqrt(steps * near / np.maximum(far, 1e-300) + 1.0 - steps)
+        return np.asarray(size * share[:, None, None] * away)
+
+    def jumps_mm2(
+        self, terms: Sequence[EffectTerm], prior_scales: Sequence[float] | FloatArray, level: int
+    ) -> FloatArray:
+        """Mean squared error (n,) of each reading over the drives' ranges by jumps of their functions between stops."""
+        linear, library, motion = self.evidence.linear, self.evidence.library, self.problem.motion
+        result = np.zeros(len(self.problem))
+        if not any(library[term.effect].steps for term in terms):
+            return result
+        start, mean = linear.base.shape[-1], whole_fit(*self._system(terms, prior_scales, level)).mean
+        used = motion.drive[self.problem.used]
+        for term, block in zip(terms, signatures(library, linear, terms), strict=True):
+            of_term = mean[start : start + block.shape[-1]]
+            start += block.shape[-1]
+            effect = library[term.effect]
+            if not effect.steps or effect.along_drives is None:
+                continue
+            coordinates = spread(effect.coordinates, term.legs) @ of_term
+            functions = enumerate(effect.along_drives(replace(motion, drive=used)))
+            for (k, function), value in zip(functions, over_range(used).T, strict=True):
+                own = effect.coordinates.legs == k + 1
+                before, after, share = jumps(value, used[:, k], function @ coordinates[own])
+                variance = effect.steps * ((after - before) ** 2 * share * (1.0 - share)).mean()
+                result += variance * (linear.drive[:, :, k] ** 2).sum(axis=1)
+        return result
+
     def gains(self, terms: Sequence[EffectTerm], prior_scales: Sequence[float] | FloatArray, level: int) -> list[float]:
         """Log predictive score that each of the terms adds to that of the others, at these prior scales.
 
@@ -154,6 +206,15 @@ class HeldOut:
         self, terms: Sequence[EffectTerm], prior_scales: Sequence[float] | FloatArray, level: int
     ) -> dict[int, ComplementFit]:
         """ComplementFit of calibration and terms by the number of the fold that is left out."""
+        white, precision, moment = self._system(terms, prior_scales, level)
+        return complement_fits(white, self.fold, precision, moment)
+
+    def _system(
+        self, terms: Sequence[EffectTerm], prior_scales: Sequence[float] | FloatArray, level: int
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Whitened columns (n, 3, k + 1) of calibration and terms, the data last; precision and moment (k,) of their
+        priors.
+        """
         linear, count = self.evidence.linear, self.evidence.linear.base.shape[-1]
         sd, mean = linear.base_prior or (np.full(count, np.inf), np.zeros(count))
         precision = np.concatenate([sd, self.evidence.scales(terms, prior_scales)]) ** -2.0
@@ -162,8 +223,7 @@ class HeldOut:
         together = np.concatenate([*self._blocks(terms), linear.data[..., None]], axis=-1)
         if self._whole_runs:
             together, _ = along_runs(together, self.problem.series)
-        white = together / np.sqrt(self._left(level))[..., None]
-        return complement_fits(white, self.fold, precision, moment)
+        return together / np.sqrt(self._left(level))[..., None], precision, moment
 
     @cached_property
     def _whole_runs(self) -> bool:

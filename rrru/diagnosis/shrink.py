@@ -85,21 +85,24 @@ def shrink_steps(
     """Steps from the calibration alone to all effects, one after another.
 
     ordered: terms in the order in which they are added. What the last step leaves is the uncertainty of its numbers
-    where it explains all, what the residuals show beyond the noise where it does not; the two are mixed by the
-    probability that something is unexplained. The draws resample runs (stretches where there are fewer than ten) and
-    redraw the fitted numbers.
+    at new stops where it explains all, what the residuals show beyond the noise where it does not; the two are mixed by
+    the probability that something is unexplained. The draws resample runs (stretches where there are fewer than ten)
+    and redraw the fitted numbers.
     """
     problem, hypothesis, level = inference.problem, inference.hypothesis, inference.level
     picks, result = resampled_rows(problem, generator, draws), []
     for count in range(len(ordered) + 1):
         terms = ordered[:count]
         last = count == len(ordered)
-        prediction = inference.held_out.predict(terms, hypothesis.strengths_of(terms, level), level, uncertain=last)
+        strengths = hypothesis.strengths_of(terms, level)
+        prediction = inference.held_out.predict(terms, strengths, level, uncertain=False)
+        spread = inference.held_out.spread_at_new_stops(terms, strengths, level) if last else prediction.spread
         shown = (prediction.residual_mm**2).sum(axis=1) - 3.0 * problem.noise_mm**2
         weight = inference.posterior.probability_unexplained if last else 1.0
-        numbers = generator.standard_normal((draws, prediction.spread.shape[-1]))
-        moved = ((prediction.spread @ numbers.T) ** 2).sum(axis=1).T
-        squares = weight * shown + (1.0 - weight) * prediction.uncertainty_mm2
+        numbers = generator.standard_normal((draws, spread.shape[-1]))
+        jumps = inference.held_out.jumps_mm2(terms, strengths, level) if last else np.zeros(len(problem))
+        moved = ((spread @ numbers.T) ** 2).sum(axis=1).T + jumps
+        squares = weight * shown + (1.0 - weight) * ((spread**2).sum(axis=(1, 2)) + jumps)
         result.append(
             ShrinkStep(
                 added=terms[-1].effect if terms else "",

@@ -3,7 +3,7 @@
 An encoder's scale, its mounting, teeth, pitch and bearings together make an error that repeats at every value of the
 drive but follows no single wave:
 
-    dq_i = sum over n of s_in sin(n u_i) + c_in cos(n u_i),   n = 1, 2, .. 128
+    dq_i = c_i0 + sum over n of s_in sin(n u_i) + c_in cos(n u_i),   n = 1, 2, .. 128
 
 u_i is the angle of a drive that turns, and pi q_i / L_i of one that slides: L_i is its stroke, of which the waves make
 any function, 1 m where none is stated. It enters at the drive's value. The coefficients of order n are independent and
@@ -13,8 +13,10 @@ normal. This is a Gaussian process on the circle. Their standard deviation is in
     1 / sqrt(1 + (n / b)^4)    with corners
     exp(-(n / b)^2 / 2)        smooth
 
-with waves up to about b per turn, with steps to order 128, else to 64. The likelihood chooses the kind and b among some
-values, for all drives or for one alone. The result is the spectrum of the error. A gear's sharp orders are
+with waves up to about b per turn, with steps to order 128, else to 64. The function is zero at the value at which the
+drive was zeroed, which is not known: the constant c_i0 has the standard deviation of the sum of the waves at one value.
+It cannot be separated from the drive's zero offset, whose interval is wider by it. The likelihood chooses the kind and
+b among some values, for all drives or for one alone. The result is the spectrum of the error. A gear's sharp orders are
 `transmission_error` and `transmission_orders`: where few waves suffice, these have fewer coefficients and a higher
 evidence. Only what the measured range of a drive resolves is fitted.
 
@@ -55,17 +57,17 @@ _STROKE_MM = 1000.0
 def for_robot(robot: Robot) -> Effect:
     """The effect model for all drives."""
     units = robot.parts.units
+    waves_of = [f"{part}{{}}_{order}" for order in ORDERS for part in ("sine", "cosine")]
     parameters = ParameterSet(
         tuple(
-            Parameter(f"{part}{drive}_{order}", unit, 0.0, -_MOST[unit], _MOST[unit], "assumed", drive)
+            Parameter(name.format(drive), unit, 0.0, -_MOST[unit], _MOST[unit], "assumed", drive)
             for drive, unit in enumerate(units, 1)
-            for order in ORDERS
-            for part in ("sine", "cosine")
+            for name in ("constant{}", *waves_of)
         )
     )
-    typical = np.repeat([_TYPICAL[unit] for unit in units], 2 * len(ORDERS))
+    typical = np.repeat([_TYPICAL[unit] for unit in units], 1 + len(waves_of))
     spectra = tuple(
-        typical * np.tile(np.repeat(falling(ORDERS / bend) * (highest >= ORDERS), 2), len(units))
+        typical * np.tile(_with_constant(falling(ORDERS / bend) * (highest >= ORDERS)), len(units))
         for falling, bends, highest, _ in _SPECTRA
         for bend in bends
     )
@@ -82,15 +84,23 @@ def for_robot(robot: Robot) -> Effect:
     )
 
     def functions(motion: Motion) -> list[FloatArray]:
-        """By drive the functions (n, 2 orders) of its value that a unit of each of its coordinates adds."""
-        return [waves(angle, ORDERS) for angle in (motion.drive * per_unit).T]
+        """By drive the functions (n, 1 + 2 orders) of its value that a unit of each of its coordinates adds."""
+        constant = np.ones((len(motion), 1))
+        return [np.concatenate([constant, waves(angle, ORDERS)], axis=1) for angle in (motion.drive * per_unit).T]
 
     def err(motion: Motion, values: FloatArray) -> Contribution:
-        """Changes of the actuator values under coefficients (K times 2 orders,) in their units."""
+        """Changes of the actuator values under coefficients (K times (1 + 2 orders),) in their units."""
         by_drive = np.reshape(values, (len(units), -1))
         return motion.at_drive_functions(functions(motion), by_drive)
 
     return Effect("drive_error_function", parameters, coordinates, err, along_drives=functions, of_drive_value=True)
+
+
+def _with_constant(sizes: FloatArray) -> FloatArray:
+    """Standard deviations (1 + 2 orders,) of the constant, and of sine and cosine of each order, from those (orders,)
+    of the orders.
+    """
+    return np.concatenate([[np.sqrt((sizes**2).sum())], np.repeat(sizes, 2)])
 
 
 def _per_unit(robot: Robot) -> FloatArray:

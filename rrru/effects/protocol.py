@@ -291,10 +291,10 @@ class Effect:
     needs: fields of Motion without which the effect model contributes nothing, "path_drive" where it depends on the
     sense in which a drive approaches a reading; along_drives: where only actuator values change, linearly in the
     coordinates, the functions of each drive in turn, from a Motion to arrays (n, c_k); of_drive_value: whether only
-    actuator values change, each by a function of itself; with_waves: where harmonic orders are searched, from pairs
-    (drive, order) and their log prior to the effect with these orders; waves: these pairs; spoils: where the effect is
-    one of the measurement and not of the robot, why a calibration without it is wrong; switches: whether the effect
-    depends on the sign of a load alone.
+    actuator values change, each by a function of itself; steps: probability that it jumps; with_waves: where harmonic
+    orders are searched, from pairs (drive, order) and their log prior to the effect with these orders; waves: these
+    pairs; spoils: where the effect is one of the measurement and not of the robot, why a calibration without it is
+    wrong; switches: whether the effect depends on the sign of a load alone.
     """
 
     name: str
@@ -305,6 +305,7 @@ class Effect:
     spoils: str = ""
     along_drives: Callable[[Motion], list[FloatArray]] | None = None
     of_drive_value: bool = False
+    steps: float = 0.0
     with_waves: Callable[[Sequence[tuple[int, float]], float], "Effect"] | None = None
     waves: tuple[tuple[int, float], ...] = ()
     switches: bool = False

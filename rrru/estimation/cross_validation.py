@@ -72,7 +72,7 @@ def choose_folds(candidates: Iterable[IntArray], columns: FloatArray) -> IntArra
 
 @dataclass(frozen=True, eq=False)
 class ComplementFit:
-    """Parameters (k,) estimated from the complement of a fold.
+    """Parameters (k,) estimated from the complement of a fold, or from all readings.
 
     mean (k,); unit (k,): scale of each parameter; factor (k, k): lower Cholesky factor of the precision in these units.
     """
@@ -94,11 +94,38 @@ def complement_fits(
     fold (m,): numbers of the folds; precision (k,), moment (k,): of the normal priors, the moment being precision times
     mean.
     """
-    result = {}
-    for number, sums in complement_sums(fold_sums(columns, fold)).items():
-        gram, target = sums[:-1, :-1], sums[:-1, -1] + moment
-        unit: FloatArray = 1.0 / np.sqrt(np.maximum(np.diag(gram) + precision, 1e-300))
-        scaled = unit[:, None] * (gram + np.diag(precision)) * unit
-        factor: FloatArray = np.asarray(np.linalg.cholesky(scaled + _RIDGE * np.eye(len(unit))))
-        result[number] = ComplementFit(unit * cho_solve((factor, True), unit * target), unit, factor)
+    sums = complement_sums(fold_sums(columns, fold))
+    return {number: _fit(of_others, precision, moment) for number, of_others in sums.items()}
+
+
+def whole_fit(columns: FloatArray, precision: FloatArray, moment: FloatArray) -> ComplementFit:
+    """The ComplementFit of all readings, for arguments as of `complement_fits`."""
+    rows = columns.reshape(-1, columns.shape[-1])
+    return _fit(rows.T @ rows, precision, moment)
+
+
+def _fit(sums: FloatArray, precision: FloatArray, moment: FloatArray) -> ComplementFit:
+    """The ComplementFit of sums of squares and products (k + 1, k + 1)."""
+    gram, target = sums[:-1, :-1], sums[:-1, -1] + moment
+    unit: FloatArray = 1.0 / np.sqrt(np.maximum(np.diag(gram) + precision, 1e-300))
+    scaled = unit[:, None] * (gram + np.diag(precision)) * unit
+    factor: FloatArray = np.asarray(np.linalg.cholesky(scaled + _RIDGE * np.eye(len(unit))))
+    return ComplementFit(unit * cho_solve((factor, True), unit * target), unit, factor)
+
+
+def left_out_spread(spread: FloatArray, group: IntArray) -> FloatArray:
+    """Spread (m, a, k) of predictions of the readings of each group (m,) from those of all others.
+
+    spread (m, a, k): whitened, of the fit of all readings. With S the spread of a group and H = S S^T its leverage, the
+    prediction without the group has the covariance (I - H)^-1 H in units of the noise (Cook and Weisberg, Residuals and
+    influence in regression, 1982, section 2.2). A combination that a group alone determines is left with
+    MIN_SHARE_IN_COMPLEMENT of its information.
+    """
+    result = np.empty_like(spread)
+    for number in np.unique(group):
+        own = group == number
+        rows = spread[own].reshape(-1, spread.shape[-1])
+        leverage, axes = np.linalg.eigh(rows @ rows.T)
+        wider = 1.0 / np.sqrt(np.maximum(1.0 - leverage, MIN_SHARE_IN_COMPLEMENT))
+        result[own] = (axes * wider @ axes.T @ rows).reshape(-1, *spread.shape[1:])
     return result

@@ -10,6 +10,9 @@ from rrru.diagnosis.calibrate import calibrate
 from rrru.diagnosis.drive_functions import drive_functions
 from rrru.diagnosis.model_fit import fit_model
 from rrru.diagnosis.terms import EffectTerm
+from rrru.effects.library import find
+from rrru.effects.protocol import ActiveEffect, Effect, plain_coordinates
+from rrru.parameters import Parameter, ParameterSet
 from tests.diagnosis import arms
 from tests.schemas import check
 
@@ -50,6 +53,30 @@ def test_it_spans_the_measured_range_and_one_place_of_each_drive_is_the_worst(fo
         worst = rows[rows["worst"]]
         assert len(worst) == 1 and worst["error"].abs().iloc[0] == rows["error"].abs().max()
         assert set(rows["name"]) == {f"axis{number}"} and set(rows["unit"]) == {"rad"}
+
+
+def _step(motion, values):
+    """The third joint's encoder errs by a constant beyond a joint of its scale."""
+    change = np.zeros_like(motion.drive)
+    change[:, 2] = values[0] * (motion.drive[:, 2] > 0.1)
+    return motion.at_drives(change)
+
+
+def test_the_interval_of_a_zero_holds_it_where_the_drive_s_error_has_a_step():
+    """The mean of the error function over all values is no part of its waves: it is confounded with the zero."""
+    name, size = "drive_error_function", 2e-3
+    parameters = ParameterSet((Parameter("size", "rad", 0.0, -0.01, 0.01, "test", 3),))
+    step = ActiveEffect(Effect("step", parameters, plain_coordinates(parameters, 1e-3), _step), {"size": size})
+    still = arms.problem_of(arms.measure(count=80, noise=(0.0, 0.0)))
+    problem = replace(arms.problem_of(arms.measure((step,), count=80)), library={name: find(name, arms.ARM)})
+    true = dict(zip(still.mechanism.parameters.names, calibrate(still).deviations, strict=True))["dq3"]
+    coordinates = problem.library[name].coordinates
+    # the first spectrum is that of steps
+    scales = size / 1e-4 * coordinates.typical[coordinates.legs == 3]
+    fit = fit_model(problem, [calibrate(problem)], [EffectTerm(name, 0, 3)], scales)
+    low, high = fit.estimate.intervals[problem.mechanism.parameters.names.index("dq3")]
+    assert low <= true <= high
+    assert high - low < 8.0 * size
 
 
 def test_an_effect_that_is_no_function_of_a_drive_s_value_has_no_rows():

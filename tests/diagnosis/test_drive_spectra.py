@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rrru.diagnosis.calibrate import calibrate
-from rrru.diagnosis.drive_spectra import amplitudes, likeliest, pursue
+from rrru.diagnosis.drive_spectra import amplitudes, jumps, likeliest, pursue
 from rrru.effects.drive_error_function import ORDERS
 from rrru.effects.library import find
 from tests.diagnosis import arms
@@ -137,9 +137,9 @@ def test_the_spectrum_that_made_the_data_is_the_likeliest():
     problem = replace(arms.problem_of(arms.measure(count=300)), library={effect.name: effect})
     linear = problem.linearise(calibrate(problem))
     basis, _ = np.linalg.qr(linear.base.reshape(linear.data.size, -1))
-    whole, count = linear.columns[effect.name, 0].reshape(linear.data.size, -1), 2 * len(ORDERS)
+    whole, count = linear.columns[effect.name, 0].reshape(linear.data.size, -1), 1 + 2 * len(ORDERS)
     # low orders of two drives do, and are quick
-    keep = np.concatenate([np.arange(2 * 48), count + np.arange(2 * 48)])
+    keep = np.concatenate([1 + np.arange(2 * 48), count + 1 + np.arange(2 * 48)])
     columns = whole[:, keep] - basis @ (basis.T @ whole[:, keep])
     spectra, hits, draws = [one[keep] for one in effect.coordinates.spectra], 0, 0
     roots, several = [[np.diag(own) for own in np.split(size, 2)] for size in spectra], [False] * len(spectra)
@@ -149,7 +149,7 @@ def test_the_spectrum_that_made_the_data_is_the_likeliest():
             prior_scale = generator.uniform(0.7, 2.0)
             data = columns @ (prior_scale * size * generator.standard_normal(len(size)))
             data = data + NOISE_MM * generator.standard_normal(len(data))
-            found, factor, noise, _ = likeliest(
+            found, factor, noise, *_ = likeliest(
                 data - basis @ (basis.T @ data), columns, (roots, several), basis.shape[1]
             )
             assert noise == pytest.approx(NOISE_MM, rel=0.1)
@@ -174,7 +174,7 @@ def test_one_drive_alone_has_the_size_that_it_has():
         root = roots[4][2]
         of_drive = columns[:, found.coordinates.legs == 3] @ (3.0 * root @ generator.standard_normal(root.shape[1]))
         data = of_drive + NOISE_MM * generator.standard_normal(len(of_drive))
-        _, factor, _, _ = likeliest(
+        _, factor, *_ = likeliest(
             data - basis @ (basis.T @ data), columns - basis @ (basis.T @ columns), spectra, basis.shape[1]
         )
         factors.append(factor)
@@ -204,3 +204,13 @@ def test_amplitudes_are_exact_where_nothing_else_acts():
     problem = arms.problem_of(arms.measure((acting,), noise=(0.0, 0.0)))
     found = amplitudes(problem, calibrate(problem), np.array([4.5]))[2]
     np.testing.assert_allclose(found, 5e-5, rtol=2e-3)
+
+
+def test_a_function_that_jumps_between_two_known_values_has_the_variance_of_all_places_of_the_jump():
+    generator, known_at, known = np.random.default_rng(0), np.array([3.0, 0.0, 1.0]), np.array([5.0, 2.0, 2.0])
+    value = np.linspace(0.0, 3.0, 31)
+    places = generator.uniform(1.0, 3.0, (20000, 1))
+    made = 2.0 + 3.0 * (value > places)
+    before, after, share = jumps(value, known_at, known)
+    np.testing.assert_allclose((after - before) ** 2 * share * (1.0 - share), made.var(axis=0), atol=0.05)
+    assert (before == 2.0).all() and (after[:10] == 2.0).all() and (after[10:] == 5.0).all()

@@ -71,10 +71,23 @@ def test_a_step_of_a_scale_is_no_noise_on_few_stops(size_mm):
     def joined(way):
         return way + size_mm * (way > [600.0, np.inf, np.inf])
 
-    found, *_ = _diagnosed(stops(joined))
+    frame = stops(joined)
+    found, *_ = _diagnosed(frame)
     assert found.verdict["effects"] == "drive_error_function" and found.verdict["leg"] == 1
     assert found.verdict["noise_rms_mm"] == pytest.approx(np.sqrt(3.0) * NOISE_MM, rel=0.3)
     assert "noise stated" not in found.verdict["notes"]
+    # between the two stops next to the step it may be anywhere
+    function = found.tables["gap_drive_functions"].query("drive == 1")
+    value, stop = function["drive_value"], np.sort(frame[GANTRY.parts.columns[0]])
+    true = size_mm * (value > 600.0)
+    between = (value > stop[stop < 600.0].max()) & (value < stop[stop > 600.0].min())
+    # the values at these two stops have errors of their own, of the noise
+    low, high = function["low_95"] - 0.5 * NOISE_MM, function["high_95"] + 0.5 * NOISE_MM
+    held = (low <= true - true.mean()) & (true - true.mean() <= high)
+    assert between.sum() > 3 and held[between].mean() > 0.9
+    # what remains at new values of the drive
+    off = np.sqrt(((function["error"] - true + true.mean()) ** 2).mean())
+    assert 0.5 * off < found.verdict["gap_after_rms_mm"] < 2.0 * off
 
 
 def test_a_large_step_of_a_scale_is_no_lead_error_in_addition():

@@ -97,6 +97,17 @@ def test_predictions_equal_a_refit_without_the_fold(passes, level):
 
 
 @pytest.mark.parametrize("level", [0, 3])
+def test_the_spread_at_a_new_stop_is_that_of_a_refit_without_it(level):
+    held_out = _setting((FORWARD,))
+    found = (held_out.spread_at_new_stops(TERMS, PRIOR_SCALES, level) ** 2).sum(axis=(1, 2))
+    alone = SimpleNamespace(problem=held_out.problem, evidence=held_out.evidence, fold=held_out.problem.stop)
+    _, uncertain = _refitted(alone, level, smooth=False)
+    np.testing.assert_allclose(found, uncertain, rtol=1e-4)
+    # fits of four fifths are less certain
+    assert found.mean() < held_out.predict(TERMS, PRIOR_SCALES, level).uncertainty_mm2.mean()
+
+
+@pytest.mark.parametrize("level", [0, 3])
 def test_what_an_effect_gains_is_what_its_prediction_alone_loses(full, level):
     whole = full.predict(TERMS, PRIOR_SCALES, level).log_score.sum()
     without = [full.predict(TERMS[1 - k : 2 - k], PRIOR_SCALES[1 - k : 2 - k], level).log_score.sum() for k in range(2)]

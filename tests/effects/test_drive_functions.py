@@ -26,8 +26,9 @@ _RING = np.stack([np.cos(_ANGLES), np.sin(_ANGLES), 0.0 * _ANGLES], axis=1)
 HEXAPOD = hexapod(300.0 * _RING, 120.0 * np.roll(_RING, 1, axis=0), 400.0, 80.0)
 FUNCTION, SHARP = "drive_error_function", "transmission_orders"
 WAVES = ((0, 3.0), (4, 7.25), (0, 41.5), (5, 1.5))
-# numbers of coefficients of the function that are looked at: of several drives, sines and cosines, low and high orders
-_ONE = 2 * len(ORDERS)
+# numbers of coefficients of the function that are looked at: of several drives, constants, sines and cosines, low and
+# high orders
+_ONE = 1 + 2 * len(ORDERS)
 _SOME = (0, 1, 2 * 6, _ONE + 2, _ONE + 2 * 30 + 1, 3 * _ONE + 7, 6 * _ONE - 1)
 
 
@@ -51,7 +52,8 @@ def _expected(name, number, drive):
     """Drive and function (n,) of one coefficient, by their definition."""
     if name == FUNCTION:
         joint, rest = divmod(number, _ONE)
-        order, cosine = rest // 2 + 1, rest % 2
+        # the constant is the cosine of order 0
+        order, cosine = (rest + 1) // 2, rest % 2 == 0
     else:
         (joint, order), cosine = WAVES[number // 2], number % 2
     return joint, (np.cos if cosine else np.sin)(order * drive[:, joint])
@@ -74,7 +76,7 @@ def test_a_coefficient_turns_its_own_joint_by_its_wave(name, motion):
 def test_the_functions_along_the_drives_are_differences_of_what_the_law_contributes(motion):
     effect, generator = _law(FUNCTION), np.random.default_rng(0)
     functions = effect.along_drives(motion)
-    assert [f.shape for f in functions] == [(40, 2 * len(ORDERS))] * 6
+    assert [f.shape for f in functions] == [(40, _ONE)] * 6
     start, site = 1e-4 * generator.standard_normal(len(effect.parameters)), arms.ARM.legs.site_numbers
     before = effect.contribute(motion, start).twists
     together = np.concatenate(functions, axis=1)
@@ -121,9 +123,9 @@ def test_a_drive_that_others_follow_moves_them_too():
     at = robot.map(drive, poses)
     functions = effect.along_drives(motion)
     for k in range(len(names)):
-        number = k * _ONE + 5
+        number = k * _ONE + 6
         made = at.move(effect.contribute(motion, np.eye(len(effect.parameters))[number]).twists)
-        np.testing.assert_allclose(functions[k][:, 5, None] * at.drive_effect[:, :, k], made, rtol=0.0, atol=1e-6)
+        np.testing.assert_allclose(functions[k][:, 6, None] * at.drive_effect[:, :, k], made, rtol=0.0, atol=1e-6)
         h = 1e-5 * np.eye(len(names))[k]
         moved = (robot.guess(drive + h, arm) - robot.guess(drive - h, arm)) / 2e-5
         np.testing.assert_allclose(made, np.cos(3.0 * drive[:, k, None]) * moved, rtol=0.0, atol=1e-3)
@@ -168,7 +170,7 @@ def test_the_waves_of_a_slide_make_any_function_of_its_stroke(robot, stroke, mot
     assert {parameter.unit for parameter in effect.parameters} == {"mm"}
     functions = effect.along_drives(replace(motion, drive=drive))
     for own in functions:
-        np.testing.assert_allclose(own[:, :2], np.hstack([f(np.pi * along / stroke) for f in (np.sin, np.cos)]))
+        np.testing.assert_allclose(own[:, 1:3], np.hstack([f(np.pi * along / stroke) for f in (np.sin, np.cos)]))
         np.testing.assert_allclose(own[:, 9], np.cos(5.0 * np.pi * along[:, 0] / stroke), atol=1e-12)
     again = effect.along_drives(replace(motion, drive=drive + 2.0 * stroke))
     np.testing.assert_allclose(again, functions, atol=1e-11)
@@ -203,7 +205,10 @@ def test_every_spectrum_falls_with_the_order_alike_for_all_drives():
     """Sine and cosine of an order have one size: 1 / n for steps at the end, 1 / n^2 for corners, or less."""
     falling = []
     for spectrum in _law(FUNCTION).coordinates.spectra:
-        sizes = np.reshape(spectrum, (6, len(ORDERS), 2))
+        by_drive = np.reshape(spectrum, (6, _ONE))
+        sizes = by_drive[:, 1:].reshape(6, len(ORDERS), 2)
+        # the constant is the function at the unknown value of zeroing
+        np.testing.assert_allclose(by_drive[:, 0] ** 2, (sizes[:, :, 0] ** 2).sum(axis=1))
         assert (sizes == sizes[:1, :, :1]).all() and (np.diff(sizes[0, :, 0]) <= 0.0).all()
         # slope in logarithms from order 32 to 64
         falling.append(np.log2(sizes[0, 31, 0] / sizes[0, 63, 0]))

@@ -21,8 +21,7 @@ from rrru.diagnosis.model_fit import fit_model
 from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.problem import DiagnosisProblem
 from rrru.diagnosis.result_notes import payload_notes
-from rrru.diagnosis.result_tables import parameter_rows
-from rrru.estimation.intervals import QUANTILE_95
+from rrru.diagnosis.result_tables import acting_places, parameter_rows
 from rrru.formats.file_changes import Found, held_by
 from rrru.formats.mjcf_writer import to_mjcf
 from rrru.formats.robot_file import mjcf_parts, urdf_parts
@@ -125,10 +124,12 @@ def _of_drives(numbers: pd.DataFrame, effect: str, stem: str, count: int) -> dic
     return {k: tuple(of_effect.loc[f"{stem}{k + 1}", columns]) for k in range(count) if len(of_effect)}
 
 
-def _determined(sizes: Mapping[int, tuple[float, float]]) -> dict[int, tuple[float, float]]:
-    """(value, standard error) by drive of those that are not zero by their 95 % interval; all where none is."""
-    chosen = {k: (value, error) for k, (value, error) in sizes.items() if not value <= QUANTILE_95 * error}
-    return chosen or dict(sizes)
+def _of_acting_drives(numbers: pd.DataFrame, effect: str, stem: str, count: int) -> dict[int, tuple[float, float]]:
+    """The result of `_of_drives` for the drives at which the effect is not zero, see `acting_places`."""
+    of_effect = numbers[numbers["effect"] == effect]
+    acting = of_effect["place"].isin(acting_places(of_effect.to_dict("records")))
+    sizes, names = _of_drives(numbers, effect, stem, count), set(of_effect.loc[acting, "parameter"])
+    return {k: size for k, size in sizes.items() if f"{stem}{k + 1}" in names}
 
 
 def _places(problem: DiagnosisProblem, stated: bool) -> dict[str, FloatArray]:
@@ -151,7 +152,7 @@ def corrected(inference: InferenceResult, section: dict[str, Any], folder: Path)
     """
     # more links at the end of a URDF's chain would leave its tip open
     reflectors = "mjcf" in section
-    diagnosed, lacking = found_of(inference, reflectors)
+    _, lacking = found_of(inference, reflectors)
     others, effects = [*lacking], [name for name, _ in inference.state.effects]
     if "urdf" in section:
         lacking += [name for name in effects if name in (_COMPLIANCE[0], _BACKLASH[0])]
@@ -165,7 +166,9 @@ def corrected(inference: InferenceResult, section: dict[str, Any], folder: Path)
     others += payload_notes(inference)
     if "urdf" in section:
         chain = {key: section.get(key) for key in ("base", "tip", "home")}
-        found = replace(found, compliance=_determined(diagnosed.compliance), play=_determined(diagnosed.play))
+        numbers, count = parameter_rows(inference), len(inference.problem.mechanism.parts.drives)
+        compliance, play = (_of_acting_drives(numbers, *which, count) for which in (_COMPLIANCE, _BACKLASH))
+        found = replace(found, compliance=compliance, play=play)
         text, lost = to_urdf(section["urdf"], found, folder, **chain)
         return Corrected(text, (*others, *lost), tuple(lacking), found)
     text, lost = to_mjcf(section["mjcf"], section["platform"], found, folder)

@@ -372,3 +372,23 @@ def test_a_tilt_that_no_file_holds_is_said_with_what_remains(attached, tmp_path,
         f"{left:.2g} mm rms remain at poses and loads like those measured"
     )
     assert end.endswith("; use corrected_drives")
+
+
+def test_a_file_lists_the_drives_of_an_effect_by_the_intervals_that_the_page_shows():
+    """A size at its bound zero is not determined, however small its standard error."""
+    numbers = pd.DataFrame(
+        {
+            "effect": "backlash",
+            "parameter": ["width1", "width2", "width3"],
+            "place": ["at joint 1", "at joint 2", "at joint 3"],
+            "value": [2e-4, 2.1e-4, 0.0],
+            "standard_error": [5e-5, 1e-4, np.nan],
+            "low_95": [1e-4, 0.0, np.nan],
+            "high_95": [3e-4, 4e-4, np.nan],
+        }
+    )
+    acting = corrected_file._of_acting_drives(numbers, "backlash", "width", 3)
+    assert acting == {0: (2e-4, 5e-5)}
+    assert corrected_file._of_acting_drives(numbers, "drive_compliance", "compliance", 3) == {}
+    undetermined = corrected_file._of_acting_drives(numbers.assign(low_95=0.0), "backlash", "width", 3)
+    assert [*undetermined] == [0, 1, 2]

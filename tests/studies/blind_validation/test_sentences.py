@@ -408,6 +408,50 @@ def test_mujoco_drives_what_numpy_says(monkeypatch):
         np.testing.assert_allclose(found.poses(acts)[0][1:], place[1:], atol=0.01)
 
 
+def test_a_compliant_drive_bears_the_load_of_the_robot_where_it_stands():
+    """Zero offset and deflection change the lever arm: the deflection is a fixed point, not that of the commands."""
+    from rrru.studies.blind_validation.sentences.causes import Cause, Stops
+    from rrru.studies.blind_validation.sentences.kinds import KINDS
+
+    robot, zeros = KINDS["arm4"](np.random.default_rng(0)), np.array([0.0, 0.1, 0.0, 0.0])
+    drive = np.array([[0.0, 0.5, -0.3, 0.2], [0.4, -0.2, 0.6, 0.0]])
+    stops = Stops(drive, np.array([0.0, 5.0]), np.arange(2.0), np.zeros(2, dtype=bool))
+    compliance = np.array([0.0, 4e-7, 2e-7, 0.0])
+    off = Cause("drive_compliance", tuple(compliance)).at_drives(robot, stops, zeros)
+    expected = compliance * robot.loads(drive + zeros + off, stops.payload_kg)
+    assert np.abs(off).max() > 0.01
+    np.testing.assert_allclose(off, expected, rtol=1e-4, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("name", "kind"), [("gain_error", "polar"), ("lead_error", "polar"), ("lead_error", "hexapod")]
+)
+def test_a_wrong_ratio_is_an_error_in_proportion_at_the_drives_of_its_unit(name, kind):
+    from rrru.studies.blind_validation.sentences.causes import Stops, draw_cause, fits
+    from rrru.studies.blind_validation.sentences.kinds import KINDS
+
+    generator = np.random.default_rng(5)
+    robot = KINDS[kind](generator)
+    assert fits(name, robot)
+    cause, unit = draw_cause(name, robot, generator), {"gain_error": "rad", "lead_error": "mm"}[name]
+    drive = robot.spans.mean(axis=1) + np.outer([1.0, 2.0], np.ptp(robot.spans, axis=1) / 8.0)
+    off = cause.at_drives(robot, Stops(drive, np.zeros(2), np.arange(2.0), np.zeros(2, dtype=bool)), 0.1)
+    acts = np.array(robot.units) == unit
+    np.testing.assert_allclose(off, drive * cause.sizes)
+    assert off[:, acts].any() and not off[:, ~acts].any()
+    assert [*cause.numbers(robot)] == [f"{name}{k}" for k in np.flatnonzero(acts) + 1]
+
+
+def test_a_crank_of_a_parallel_robot_has_no_gain():
+    from rrru.studies.blind_validation.sentences.causes import fits
+    from rrru.studies.blind_validation.sentences.kinds import KINDS
+
+    generator = np.random.default_rng(0)
+    robots = {name: KINDS[name](generator) for name in ("delta", "hexapod", "arm6", "gantry3", "gantry5")}
+    assert [name for name, robot in robots.items() if fits("gain_error", robot)] == ["arm6", "gantry5"]
+    assert [name for name, robot in robots.items() if fits("lead_error", robot)] == ["hexapod", "gantry3", "gantry5"]
+
+
 def test_statements_are_the_same_again_and_nothing_is_of_an_unknown_kind():
     import yaml
 
@@ -452,12 +496,14 @@ def test_a_judged_page_is_what_the_library_answers(tmp_path):
     np.testing.assert_allclose(found.rotation @ own.frame[0], np.eye(3), atol=5e-3)
 
 
-def test_a_stop_that_moves_a_slide_by_less_than_its_backlash_is_no_windup(tmp_path):
+def test_a_stop_that_moves_a_slide_by_less_than_its_backlash_is_no_windup(tmp_path, monkeypatch):
     """At such a stop a narrow backlash moves the slide the other way: with a windup both made up for that."""
-    from rrru.studies.blind_validation.sentences import page
-    from rrru.studies.blind_validation.sentences.draws import draw
+    from rrru.studies.blind_validation.sentences import draws, page
 
-    own = draw(13, 770213, 300, 0.1)
+    # the causes among which this robot's was drawn
+    drawn_from = [name for name in draws.NAMES if name not in ("gain_error", "lead_error")]
+    monkeypatch.setattr(draws, "NAMES", drawn_from)
+    own = draws.draw(13, 770213, 300, 0.1)
     rows = own.table(own.readings(own.poses()), True)[np.repeat(~own.stops.fresh, len(own.targets))]
     own.write(tmp_path, rows, "stops.csv")
     section, robot = own.section(tmp_path, "stops.csv"), own.nominal.section(str(tmp_path / own.robot_file), own.kind)

@@ -9,6 +9,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from rrru.studies.blind_validation.sentences.own_robots import Rods
+
 
 @dataclass(frozen=True)
 class Stops:
@@ -50,12 +52,14 @@ class Cause:
         bounds = _MAX_SIZE.get(self.name, _MAX_SIZE[""])
         return bool((np.abs(self.sizes) > [bounds[unit] for unit in robot.units]).any())
 
-    def at_drives(self, robot, stops):
-        """Errors (n, K) of the actuator positions."""
+    def at_drives(self, robot, stops, zeros=0.0):
+        """Errors (n, K) of the actuator positions; zeros (K,): zero offsets of the drives, which change the loads."""
         sizes = np.array(self.sizes)
         if self.name == "base_drift":
             return np.zeros_like(stops.drive)
-        return _AT_DRIVES[self.name](sizes, self.more, robot, stops)
+        # encoders and screws err by the value that they read
+        at = replace(stops, drive=stops.drive + zeros) if self.name == "drive_compliance" else stops
+        return _AT_DRIVES[self.name](sizes, self.more, robot, at)
 
     def of_base(self, stops):
         """Translations (n, 3) of the robot relative to the instrument."""
@@ -70,7 +74,8 @@ class Cause:
         stem = _STEMS.get(self.name)
         if stem is None:
             return {}
-        numbers = {f"{stem}{k}": size for k, size in enumerate(self.sizes, 1)}
+        unit = _UNITS.get(self.name)
+        numbers = {f"{stem}{k}": size for k, size in enumerate(self.sizes, 1) if unit in (None, robot.units[k - 1])}
         if stem == "amplitude":
             phases = self.more["phase"]
             numbers |= {f"phase{k}": phases[k - 1] for k, size in enumerate(self.sizes, 1) if size}
@@ -85,7 +90,11 @@ _STEMS = {
     "drive_compliance": "compliance",
     "encoder_eccentricity": "amplitude",
     "transmission_error": "amplitude",
+    "gain_error": "gain_error",
+    "lead_error": "lead_error",
 }
+# unit of the drives at which a cause can act, where it is one of two
+_UNITS = {"encoder_eccentricity": "rad", "gain_error": "rad", "lead_error": "mm"}
 
 
 def _backlash(sizes, _more, _robot, stops):
@@ -98,8 +107,11 @@ def _backlash(sizes, _more, _robot, stops):
 
 
 def _wind_up(sizes, _more, robot, stops):
-    """A compliant drive deflects in proportion to its load."""
-    return sizes * robot.loads(stops.drive, stops.payload_kg)
+    """A compliant drive deflects in proportion to its load, which is that of the deflected robot."""
+    deflected = np.zeros_like(stops.drive)
+    for _ in range(_DEFLECTIONS):
+        deflected = sizes * robot.loads(stops.drive + deflected, stops.payload_kg)
+    return deflected
 
 
 def _once_a_turn(sizes, more, _robot, stops):
@@ -122,6 +134,11 @@ def _step(sizes, more, _robot, stops):
     return sizes * (stops.drive > more["at"])
 
 
+def _in_proportion(sizes, _more, _robot, stops):
+    """The ratio of a gear, belt or screw differs from the nominal one."""
+    return sizes * stops.drive
+
+
 _AT_DRIVES = {
     "backlash": _backlash,
     "drive_compliance": _wind_up,
@@ -129,17 +146,31 @@ _AT_DRIVES = {
     "transmission_error": _waves,
     "drive_error_function": _local,
     "scale_step": _step,
+    "gain_error": _in_proportion,
+    "lead_error": _in_proportion,
 }
 # largest sizes by the unit of a drive, and of a drift
 _MAX_SIZE = {
     "": {"rad": 5e-3, "mm": 0.5},
     "backlash": {"rad": 1e-2, "mm": 0.8},
     "drive_compliance": {"rad": 5e-7, "mm": 0.02},
+    "gain_error": {"rad": 2e-2, "mm": 0.0},
+    "lead_error": {"rad": 0.0, "mm": 1e-2},
 }
 _MAX_DRIFT_MM_S = 5e-3
+# loads next to a singular pose change with the deflection; each repetition adds a power of that share
+_DEFLECTIONS = 3
 # causes that MuJoCo can simulate, with their names there
 MUJOCO = {"backlash": "play", "drive_compliance": "actuator_stiffness"}
 NAMES = (*_AT_DRIVES, "base_drift")
+
+
+def fits(name, robot):
+    """Whether a cause can act in a robot.
+
+    Of cranks of parallel robots, which swing through small angles, a gain is the slope of an eccentricity.
+    """
+    return _UNITS.get(name) in (None, *robot.units) and not (name == "gain_error" and isinstance(robot, Rods))
 
 
 def draw_cause(name, robot, generator):
@@ -147,12 +178,14 @@ def draw_cause(name, robot, generator):
     count, spans = len(robot.units), robot.spans
     if name == "base_drift":
         return Cause(name, tuple(generator.standard_normal(3).tolist()))
-    acts = np.ones(count, dtype=bool)
-    if name in ("encoder_eccentricity", "transmission_error") and "rad" in robot.units:
-        acts = np.array(robot.units) == "rad"
+    # waves per millimetre need drives of one unit
+    unit = "rad" if name == "transmission_error" and "rad" in robot.units else _UNITS.get(name)
+    acts = np.array([unit in (None, own) for own in robot.units])
     sizes = np.abs(generator.normal(1.0, 0.4, count)) * acts
     # 1 mm at a slide and 1 / 500 rad at a rotary drive displace a tool at half a metre alike
     sizes = np.where(np.array(robot.units) == "rad", sizes / 500.0, sizes)
+    if name in ("gain_error", "lead_error"):
+        sizes = sizes * generator.choice([-1.0, 1.0], count)
     if name in ("drive_error_function", "scale_step") or generator.random() < 0.5:
         sizes = np.where(np.arange(count) == generator.choice(np.flatnonzero(acts)), sizes, 0.0)
     more, width = {}, np.ptp(spans, axis=1)

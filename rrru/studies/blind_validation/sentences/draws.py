@@ -13,7 +13,7 @@ from rrru.robots.catalogue import make_mechanism
 from rrru.seeds import stream
 from rrru.studies.blind_validation.causes import draw_log_uniform
 from rrru.studies.blind_validation.models import TARGETS_MM
-from rrru.studies.blind_validation.sentences.causes import MUJOCO, NAMES, Cause, Stops, draw_cause
+from rrru.studies.blind_validation.sentences.causes import MUJOCO, NAMES, Cause, Stops, draw_cause, fits
 from rrru.studies.blind_validation.sentences.kinds import KINDS
 
 # errors of a robot as built relative to its file, 1 sigma
@@ -72,7 +72,7 @@ class Draw:
         acting = self.cause if cause else None
         if self.plant == "mujoco":
             return self.driven[acting is not None]
-        off = acting.at_drives(self.built, stops) if acting else 0.0
+        off = acting.at_drives(self.built, stops, self.zeros) if acting else 0.0
         place, turn = self.built.poses(stops.drive + self.zeros + off)
         return place + (acting.of_base(stops) if acting else 0.0), turn
 
@@ -141,7 +141,7 @@ def draw(number, seed, most_stops, mujoco_share):
         generator = stream(seed, "sentences", number, attempt)
         plant = "mujoco" if generator.random() < mujoco_share else "numpy"
         own = _still(number, seed, plant, most_stops, generator)
-        names = [*MUJOCO] if plant == "mujoco" else [name for name in NAMES if _fits(name, own.nominal)]
+        names = [*MUJOCO] if plant == "mujoco" else [name for name in NAMES if fits(name, own.nominal)]
         if generator.random() < _ACTING:
             cause = draw_cause(str(generator.choice(names)), own.nominal, generator)
             own = _sized(own, cause, draw_log_uniform(_STRENGTHS, generator))
@@ -180,11 +180,6 @@ def _still(number, seed, plant, most_stops, generator):
         noise_mm=draw_log_uniform(NOISE_MM, generator),
         seed=seed,
     )
-
-
-def _fits(name, robot):
-    """Whether a cause can act in a robot."""
-    return name != "encoder_eccentricity" or "rad" in robot.units
 
 
 def _turns(robot):
