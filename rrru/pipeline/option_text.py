@@ -26,6 +26,8 @@ _KEYS = (
 )
 # such a key in a message, with its value as YAML writes it in a line
 _STATED = re.compile(rf"\b({'|'.join(_KEYS)}): (\{{[^{{}}]*\}}|\[[^\[\]]*\]|[\w.]+)")
+# the message on a tool that is elsewhere states its place, which is a key of the robot
+_TOOL = re.compile(r"\ba tool at \(([^()]*)\) mm")
 
 
 def as_option(key: str, value: Any) -> str:
@@ -50,7 +52,8 @@ def options_in(message: str) -> list[str]:
     """
     found = (f"{key}={value}" for key, value in _STATED.findall(message))
     stated = dict.fromkeys(found)
-    return [as_option(*one.split("=", 1)) for one in stated]
+    tools = (f"--tool {place.replace(' ', '')}" for place in _TOOL.findall(message))
+    return [*(as_option(*one.split("=", 1)) for one in stated), *dict.fromkeys(tools)]
 
 
 def as_command(section: Mapping[str, Any], entry: Mapping[str, Any]) -> str:

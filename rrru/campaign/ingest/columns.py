@@ -76,16 +76,19 @@ def resolve(
         if ours in found and (stated := unit_of(found[ours])) in others:
             allowed = f"{unit}: convert the column, and its name"
             problems.add("unit", column=found[ours], value=f"the unit {stated}", allowed=allowed)
-    # drive values determine the commanded positions as well
-    sent = set(drives) <= set(found) and not set(COMMAND) & set(found)
+    # drive values determine the commanded positions as well; where some are missing, these are the problem
+    sent = bool(set(drives) & set(found)) and not set(COMMAND) & set(found)
+    listed = ", ".join(name for name in names if name not in cells.added)
     for ours, theirs in wanted.items():
         if ours not in found and ((ours in REQUIRED and not (sent and ours in COMMAND)) or ours in spec.columns):
-            allowed = f"a column {theirs}{_advice(ours, _nearest(theirs, extra))}; the file has {', '.join(names)}"
+            allowed = f"a column {theirs}{_advice(ours, _nearest(theirs, extra))}; the file has {listed}"
             problems.add("missing column", column=theirs, value="no such column", allowed=allowed)
     given = ", ".join(found[name] for name in drives if name in found)
     if 0 < sum(name in found for name in drives) < len(drives):
-        allowed = f"all of {', '.join(drives)}, or none"
-        problems.add("missing column", column=given, value=f"some {drive_name(mechanism)}", allowed=allowed)
+        lacking = ", ".join(name for name in drives if name not in found)
+        value = f"some {drive_name(mechanism)}, but not {lacking}"
+        allowed = f"all of {', '.join(drives)}{'' if sent else ', or none'}"
+        problems.add("missing column", column=given, value=value, allowed=allowed)
     for group in _GROUPS:
         given = ", ".join(found[name] for name in group if name in found)
         if 0 < sum(name in found for name in group) < len(group):
