@@ -14,6 +14,7 @@ import yaml
 
 import rrru
 from rrru import api, cli
+from rrru.pipeline.option_text import options_in
 from rrru.studies.blind_validation.sentences.mistakes import MISTAKES, shows, with_mistake
 from tests.places import ROOT
 
@@ -228,6 +229,11 @@ def test_keys_of_a_message_are_options_for_a_user_of_the_command(tmp_path, capsy
     code, _, message = ran(capsys, "diagnose", tmp_path / "moved.csv", "--robot", "rrru3", "--out", tmp_path / "out")
     assert code == cli.REFUSED and "frame: register" in message
     assert message.splitlines()[-1] == "as options of the command: --frame register"
+
+
+def test_the_place_of_the_tool_is_an_option_for_a_user_of_the_command():
+    said = "allowed: a tool at (85.9, 12, -29.9) mm (the robot's tool_mm), which leaves 0.9 mm rms"
+    assert options_in(said) == ["--tool 85.9,12,-29.9"]
 
 
 def test_a_proposal_is_a_command_as_well_as_yaml(tmp_path, capsys):

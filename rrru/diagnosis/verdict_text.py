@@ -486,14 +486,18 @@ def _next(facts: Facts) -> list[str]:
     said = [_undecidable(facts)] if facts["undecided"] else []
     if facts["next"]:
         best = facts["next"][0]
-        what = f"measure {best['run']} (see gap_next_poses)" if best["kind"] == "poses" else f"drive {best['run']}"
+        what = (
+            f"measure {best['run']} (see the table gap_next_poses)"
+            if best["kind"] == "poses"
+            else f"drive {best['run']}"
+        )
         sure = best["gain_nats"] >= OPTIONS.decisive_gain_nats
         verb = "decides" if sure else "would help to decide"
         return [*said, f"Next: {what}. That {verb} {_contest(best['separates'])}."]
     if said:
         return said
     if facts["unexplained"]:
-        where = "gap_locate says where the gap is largest"
+        where = "the table gap_locate says where the gap is largest"
         return [f"Next: no run is advised, since no effect model fits the unexplained part; {where}."]
     decided = not (facts["groups"] or facts["confounded_with"])
     least = min((effect["probability"] for effect in facts["effects"]), default=facts["probability"])

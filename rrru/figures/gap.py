@@ -82,7 +82,7 @@ def gap(tables, options):
     words = {"drives": options["drives"], "noun": options["drive_noun"]}
     points, headline = _sized(tables["gap_points"], campaign), _headline(verdict, causes, words)
     used = points[points["used"]]
-    figure, panels = _page(sum(map(len, headline)), len(causes), shrink["trajectory"].nunique(), used)
+    figure, panels = _page(sum(map(len, headline)), len(causes), len(_rows_of(shrink["trajectory"])), used)
     _write(panels["headline"], headline)
     draw_budget(panels["budget"], frames["gap_budget"])
     _map(figure, panels, used, verdict, options["z_down"], "(a) ")
@@ -233,7 +233,7 @@ def _shrink(axes, shrink, verdict):
     kind = next(name for name in _KINDS if (shrink["kind"] == name).any())
     rows = shrink[shrink["kind"] == kind]
     first, last = (rows[rows["step"] == step].set_index("trajectory") for step in (0, rows["step"].max()))
-    names = sorted(first.index, key=lambda name: (name != "*", choose.natural(name)))
+    names = _rows_of(first.index)
     place = np.arange(len(names))
     values = [part.reindex(names)["gap_rms_mm"].to_numpy() for part in (first, last)]
     axes.axvline(verdict["noise_rms_mm"], **_NOISE)
@@ -251,6 +251,12 @@ def _shrink(axes, shrink, verdict):
     axes.set(xlabel=f"{_KINDS[kind]} gap, rms (mm)", ylabel="trajectory")
     axes.set_title("(c) remaining gap")
     axes.grid(True, axis="x")
+
+
+def _rows_of(trajectories):
+    """Names of the rows of panel (c): all points, "*", then each trajectory where there are several."""
+    names = sorted(set(trajectories), key=lambda name: (name != "*", choose.natural(name)))
+    return names if len(names) > 2 else names[:1]
 
 
 def _along(axes, points, verdict):

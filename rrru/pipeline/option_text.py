@@ -31,6 +31,8 @@ _KEYS = (
 )
 # one of _KEYS in a message, with its value as YAML writes it in a line
 _STATED = re.compile(rf"\b({'|'.join(_KEYS)}): (\{{[^{{}}]*\}}|\[[^\[\]]*\]|[\w.]+)")
+# the message on a tool that is elsewhere states its place, which is a key of the robot
+_TOOL = re.compile(r"\ba tool at \(([^()]*)\) mm")
 
 
 def as_option(key: str, value: Any) -> str:
@@ -53,7 +55,9 @@ def options_in(message: str) -> list[str]:
     >>> options_in("far off; allowed: frame: register turns another frame in")
     ['--frame register']
     """
-    return [as_option(key, value) for key, value in dict.fromkeys(_STATED.findall(message))]
+    stated = [as_option(key, value) for key, value in dict.fromkeys(_STATED.findall(message))]
+    tools = dict.fromkeys(_TOOL.findall(message))
+    return [*stated, *(f"--tool {place.replace(' ', '')}" for place in tools)]
 
 
 def as_command(section: Mapping[str, Any], entry: Mapping[str, Any]) -> str:

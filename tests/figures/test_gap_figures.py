@@ -135,6 +135,13 @@ def test_the_shrink_is_the_last_held_out_step_of_every_trajectory(frames):
     assert closed[:2] == ["96 % (94 to 98)", "95 % (93 to 97)"]
 
 
+def test_a_single_trajectory_has_one_row(frames):
+    shrink = frames["gap_shrink"]
+    frames["gap_shrink"] = shrink[shrink["trajectory"].isin(["*", "spiral"])]
+    axes = panel(draw("gap", frames), "(c)")
+    assert [label.get_text() for label in axes.get_yticklabels()] == ["all"]
+
+
 def test_the_headline_says_verdict_leg_probability_and_what_to_run_next(frames):
     bold, *rest = written(draw("gap", frames).axes[0])
     assert bold == "link flexure + backlash, leg 2 (p = 0.97): 0.37 mm gap, 96 % explained (95 %: 94 to 98)"

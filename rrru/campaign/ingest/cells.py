@@ -49,7 +49,8 @@ class Cells:
 
     means: our names of columns that the format knows, to the file's; factors: what brings columns to mm whose unit the
     file states; spreads: what makes a standard deviation of expanded uncertainties; commas: columns with decimal
-    commas; unused: columns that the format knows and nothing needs; notes: what the user should know.
+    commas; unused: columns that the format knows and nothing needs; added: columns that the file does not have; notes:
+    what the user should know.
     """
 
     names: list[str]
@@ -60,6 +61,7 @@ class Cells:
     spreads: Mapping[str, float] = field(default_factory=dict)
     commas: frozenset[str] = frozenset()
     unused: tuple[str, ...] = ()
+    added: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
 
 

@@ -80,18 +80,21 @@ def resolve(
         if ours in found and (stated := unit_of(found[ours])) in others:
             allowed = f"{unit}: convert the column, and its name"
             problems.add("unit", column=found[ours], value=f"the unit {stated}", allowed=allowed)
-    # a file may state actuator values in place of commanded positions, which follow from them
-    only_drives = set(drives) <= set(found) and not set(COMMAND) & set(found)
+    # drive values determine the commanded positions as well; where some are missing, these are the problem
+    only_drives = bool(set(drives) & set(found)) and not set(COMMAND) & set(found)
+    listed = ", ".join(name for name in names if name not in cells.added)
     for ours, theirs in wanted.items():
         if ours not in found and ((ours in REQUIRED and not (only_drives and ours in COMMAND)) or ours in spec.columns):
-            allowed = f"a column {theirs}{_advice(ours, _nearest(theirs, extra))}; the file has {', '.join(names)}"
+            allowed = f"a column {theirs}{_advice(ours, _nearest(theirs, extra))}; the file has {listed}"
             problems.add("missing column", column=theirs, value="no such column", allowed=allowed)
-    groups = [(tuple(drives), f"some {drive_name(mechanism)}")]
-    groups += [(group, "a part of the noise" if group is NOISE else "a part of an orientation") for group in _GROUPS]
-    for group, part in groups:
-        given = [found[name] for name in group if name in found]
-        if 0 < len(given) < len(group):
+    for group in (tuple(drives), *_GROUPS):
+        given, lacking = [found[name] for name in group if name in found], [name for name in group if name not in found]
+        if given and lacking:
+            part = "a part of the noise" if group is NOISE else "a part of an orientation"
             allowed = f"all of {', '.join(group)}, or none"
+            if group == tuple(drives):
+                part = f"some {drive_name(mechanism)}, but not {', '.join(lacking)}"
+                allowed = f"all of {', '.join(group)}{'' if only_drives else ', or none'}"
             problems.add("missing column", column=", ".join(given), value=part, allowed=allowed)
     if spec.extra_columns == "refuse":
         unused = [ours for ours in wanted if ours not in found]

@@ -50,7 +50,8 @@ def with_commands(spec: IngestSpec, measured: Cells, problems: Problems) -> Cell
     if absent and (measured.means or not names_trajectories(measured.names)):
         notes = (*measured.notes, f"no column trajectory: all points count as one, {_ONE}")
         cells = {**measured.cells, "trajectory": [_ONE] * len(measured.rows)}
-        return replace(measured, names=[*measured.names, "trajectory"], cells=cells, notes=notes)
+        names = [*measured.names, "trajectory"]
+        return replace(measured, names=names, cells=cells, added=("trajectory",), notes=notes)
     return measured
 
 

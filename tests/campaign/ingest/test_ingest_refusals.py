@@ -148,6 +148,14 @@ def test_a_file_that_is_not_what_it_should_be(case, tmp_path):
     assert_problem(problems, None, None, value, allowed)
 
 
+def test_a_missing_column_lists_those_of_the_file_alone(tmp_path):
+    """`trajectory`, which is added to a file without one, is not among them."""
+    lacking = FIELD.drop(columns=["run", "trajectory", "point", "measured_x_mm"])
+    problems = problems_of(lacking, tmp_path)
+    allowed = f"a column measured_x_mm; the file has {', '.join(lacking.columns)}"
+    assert [problem["allowed"] for problem in problems] == [allowed]
+
+
 def test_a_directory(tmp_path):
     (tmp_path / "f.csv").mkdir()
     assert_problem(problems_of(None, tmp_path), None, None, "a directory", "a file of measurements")
@@ -253,8 +261,16 @@ ROWS = {
         {},
         None,
         "theta1_rad, theta3_rad",
-        "some drive angles",
+        "some drive angles, but not theta2_rad",
         "or none",
+    ),
+    "some drive angles without commanded positions": (
+        FIELD.drop(columns=["theta2_rad", *COMMAND]),
+        {},
+        None,
+        "theta1_rad, theta3_rad",
+        "some drive angles, but not theta2_rad",
+        "all of theta1_rad, theta2_rad, theta3_rad",
     ),
     "a blank drive angle": (FIELD.assign(theta2_rad=""), {}, 1, "theta2_rad", "blank", "a number"),
     "a point twice": (
