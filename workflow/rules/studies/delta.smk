@@ -77,21 +77,6 @@ rule delta_calibrate:
         "../../scripts/delta_calibrate.py"
 
 
-rule delta_twin:
-    input:
-        delta_dots=table("delta_dots"),
-        delta_truth=under("delta")("truth"),
-    output:
-        twin=f"{RESULTS}/twin/delta.yaml",
-    log:
-        f"{RESULTS}/logs/delta_twin.log",
-    params:
-        settings=reads(*_SCENE, "delta.search"),
-        code=code("delta_twin"),
-    script:
-        "../../scripts/delta_twin.py"
-
-
 rule delta:
     input:
         named([*DELTA_IMAGE_TABLES, *DELTA_TABLES]).values(),
