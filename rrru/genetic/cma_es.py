@@ -7,14 +7,17 @@ control, rank-one and rank-mu updates, all numbers as there. Genes are in 0..1.
 
 import numpy as np
 
+from rrru.arrays import FloatArray
 from rrru.genetic import operators
+from rrru.genetic.plan import Box
 from rrru.genetic.result import GeneticResult, means
+from rrru.genetic.settings import GeneticSettings, Objective
 
 # the distribution begins in the middle of the bounds, at the nominal robot, and ends where no gene spreads any more
 _MIDDLE, _SPREAD, _LEAST_SPREAD = 0.5, 0.3, 1e-12
 
 
-def run(rate, box, settings, seed):
+def run(rate: Objective, box: Box, settings: GeneticSettings, seed: int) -> GeneticResult:
     """GeneticResult of a checked objective within a Box; see `algorithm.minimise`.
 
     Of GeneticSettings it uses the population, all islands together, and the stop criteria. Genes drawn outside of the
@@ -22,7 +25,10 @@ def run(rate, box, settings, seed):
     """
     generator, search = np.random.default_rng(seed), Distribution(box.low.size, sum(settings.populations))
     stall = settings.stall_generations, settings.stall_tolerance
-    best, found, mean, stopped = [], [], [], "generations"
+    best: list[float] = []
+    found: list[FloatArray] = []
+    mean: list[FloatArray] = []
+    stopped = "generations"
     for generation in range(settings.generations + 1):
         genes = np.clip(search.draw(generator), 0.0, 1.0)
         score = rate(operators.decoded(genes, box))
@@ -52,7 +58,7 @@ class Distribution:
     It begins with independent genes of one spread about a mean, by default in the middle of the bounds.
     """
 
-    def __init__(self, genes, count, mean=_MIDDLE, spread=_SPREAD):
+    def __init__(self, genes: int, count: int, mean: float | FloatArray = _MIDDLE, spread: float = _SPREAD) -> None:
         self.count, self.mean, self.size, self.learned = count, np.zeros(genes) + mean, spread, 0
         share = np.log((count + 1) / 2) - np.log(np.arange(1, count // 2 + 1))
         self.weights = share / share.sum()
@@ -67,16 +73,16 @@ class Distribution:
         self.covariance, self.axes, self.lengths = np.eye(genes), np.eye(genes), np.ones(genes)
 
     @property
-    def spread(self):
+    def spread(self) -> float:
         """Largest standard deviation of a gene."""
-        return self.size * self.lengths.max()
+        return float(self.size * self.lengths.max())
 
-    def draw(self, generator):
+    def draw(self, generator: np.random.Generator) -> FloatArray:
         """Genes (n, p), also outside of the bounds."""
         normal = generator.standard_normal((self.count, len(self.mean)))
         return self.mean + self.size * (normal * self.lengths) @ self.axes.T
 
-    def learn(self, ranked):
+    def learn(self, ranked: FloatArray) -> None:
         """Update the distribution from genes (n, p), the best first."""
         apart = (ranked[: len(self.weights)] - self.mean) / self.size
         step = self.weights @ apart
