@@ -1,6 +1,5 @@
 """Figures of paper B's robot: its singularities, its backlash and its repeatability."""
 
-import numpy as np
 from matplotlib.lines import Line2D
 
 from rrru.figures import style
