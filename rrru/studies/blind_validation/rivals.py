@@ -254,11 +254,6 @@ def _by_probabilities(method, *labels):
     return answer
 
 
-def _by_gaussian_process(measurements, known, settings):
-    """The explained fraction by a Gaussian process, without effects and probabilities."""
-    return "", {}, gaussian_process(_campaign(measurements, known, settings))
-
-
 def _campaign(measurements, known, settings):
     """The Campaign of a measurement table of a MeasuredRobot, by GapSettings."""
     return Campaign.of(measurements, known, settings.library(known.mechanism))
@@ -269,5 +264,5 @@ _METHODS = {
     "bic": _by_probabilities(bayes_information),
     "lasso": _by_probabilities(lasso, "lasso"),
     "spike_and_slab": _by_probabilities(spike_and_slab, "spike_and_slab"),
-    "gaussian_process": _by_gaussian_process,
+    "gaussian_process": lambda *given: ("", {}, gaussian_process(_campaign(*given))),
 }
