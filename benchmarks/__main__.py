@@ -53,14 +53,11 @@ def write_page(frame):
 
 def machine():
     """The kind of machine."""
-    names = [line.partition(":")[2].strip() for line in _cpuinfo() if line.startswith("model name")]
-    return f"{cpu_count()} cores of {names[0] if names else platform.machine()}, Python {platform.python_version()}"
-
-
-def _cpuinfo():
-    """Lines of Linux on its processors, none on other systems."""
+    # other systems than Linux do not have this file
     path = Path("/proc/cpuinfo")
-    return path.read_text().splitlines() if path.exists() else []
+    lines = path.read_text().splitlines() if path.exists() else []
+    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    return f"{cpu_count()} cores of {names[0] if names else platform.machine()}, Python {platform.python_version()}"
 
 
 def table(frame):

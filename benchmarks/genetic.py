@@ -30,6 +30,8 @@ GENERATIONS = 1400
 _CROSSED, _ELITES = 22, 2
 _SEEDS, _ABOVE, _BUDGET = 20, 1.01, GENERATIONS * POPULATION
 _ANGLE_RAD, _LENGTH_MM = 0.025, 3.0
+# individuals that are rated with fsolve
+_TIMED = 40
 _FIRST = "PyGAD, own operators, a call per individual, fsolve inside"
 _SLOW = "PyGAD, own operators, a call per individual, our kernel"
 OWN = {"cma_es": harness.OURS} | {name: f"rrru, operators: {name}" for name in ("matlab_adaptive", "matlab_gaussian")}
@@ -214,12 +216,12 @@ def row_of_search(task, runs, name, note=""):
     return row | {"ratio": seconds / own}
 
 
-def seconds_by_fsolve(residuals, least=40):
+def seconds_by_fsolve(residuals):
     """Seconds of an evaluation with fsolve inside."""
-    individuals, start = population(least), process_time()
+    individuals, start = population(_TIMED), process_time()
     for one in individuals:
         mean_by_fsolve(residuals, one)
-    return (process_time() - start) / least
+    return (process_time() - start) / _TIMED
 
 
 def rows():

@@ -39,7 +39,7 @@ memory_mib             float? most memory of the process, where it was measured
 note                   str    a note; empty for none
 """)[0]
 
-_SHORTEST_S, _ROUNDS, _LEAST_ROUNDS = 0.02, 15, 3
+_SHORTEST_S, _BUDGET_S, _ROUNDS, _LEAST_ROUNDS = 0.02, 40.0, 15, 3
 
 
 @dataclass(frozen=True)
@@ -49,18 +49,18 @@ class Call:
     function: Callable
     units: int = 1
 
-    def seconds(self, clock, loops):
-        """Seconds per unit."""
-        start = clock()
+    def seconds(self, loops):
+        """Seconds of this process per unit."""
+        start = process_time()
         for _ in range(loops):
             self.function()
-        return (clock() - start) / (loops * self.units)
+        return (process_time() - start) / (loops * self.units)
 
-    def loops(self, clock):
+    def loops(self):
         """Number of calls for a long enough timing, after a first call that may compile."""
         self.function()
         loops = 1
-        while (spent := self.seconds(clock, loops) * loops * self.units) < _SHORTEST_S:
+        while (spent := self.seconds(loops) * loops * self.units) < _SHORTEST_S:
             loops = max(2 * loops, int(loops * _SHORTEST_S / max(spent, 1e-9)))
         return loops
 
@@ -80,21 +80,21 @@ class Task:
         others = {"evaluations": None, "memory_mib": None, "note": ""}
         return {"group": self.group, "what": self.what, "size": self.size, "peer": peer} | spent | others | more
 
-    def in_turns(self, ours, peers, budget_s=40.0, clock=process_time, notes=None):
+    def in_turns(self, ours, peers, notes=None):
         """Rows of Calls: `peers` by name, each followed by `ours` in every round.
 
-        The clock counts seconds of this process, so that what else runs on the machine counts little. Rounds end with
-        the budget, three are made in any case.
+        Seconds are those of this process, so that what else runs on the machine counts little. Rounds end after
+        `_BUDGET_S`, three are made in any case.
         """
         notes, started = notes or {}, perf_counter()
-        own_loops, loops = ours.loops(clock), {name: call.loops(clock) for name, call in peers.items()}
+        own_loops, loops = ours.loops(), {name: call.loops() for name, call in peers.items()}
         own, theirs = {name: [] for name in peers}, {name: [] for name in peers}
         for done in range(_ROUNDS):
-            if done >= _LEAST_ROUNDS and perf_counter() - started > budget_s:
+            if done >= _LEAST_ROUNDS and perf_counter() - started > _BUDGET_S:
                 break
             for name, call in peers.items():
-                theirs[name].append(call.seconds(clock, loops[name]))
-                own[name].append(ours.seconds(clock, own_loops))
+                theirs[name].append(call.seconds(loops[name]))
+                own[name].append(ours.seconds(own_loops))
         every = [second for seconds in own.values() for second in seconds]
         rows = [self.row(OURS, statistics.median(every), [1.0], note=notes.get(OURS, ""))]
         for name in peers:

@@ -5,6 +5,7 @@ of parameters that they determine, and the prior decides the others. The prior i
 bounds state, see `Block.geometry`.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Self
@@ -33,7 +34,7 @@ _OPTIONS = SolverOptions(step_tolerance=1e-3, max_iterations=60)
 # noise of the best instruments
 _FINE_NOISE_MM = 0.01
 # influence psi(r) and its slope of the robust losses, from their squared residual z in units of the loss scale
-_SLOPES = {
+_SLOPES: dict[str, Callable[[FloatArray], tuple[FloatArray, FloatArray]]] = {
     "soft_l1": lambda z: ((1.0 + z) ** -0.5, -0.5 * (1.0 + z) ** -1.5),
     "huber": lambda z: (
         np.where(z <= 1.0, 1.0, np.maximum(z, 1.0) ** -0.5),
@@ -73,7 +74,8 @@ class Calibration:
     @property
     def parameters(self) -> ParameterSet:
         """The robot's parameters."""
-        return self.observations.mechanism.parameters
+        parameters: ParameterSet = self.observations.mechanism.parameters
+        return parameters
 
     @property
     def deviations(self) -> FloatArray:
@@ -108,7 +110,7 @@ class Calibration:
     @property
     def distance_mm(self) -> FloatArray:
         """Distances (n,) of the positions."""
-        return np.linalg.norm(self._position_residual_mm, axis=1)
+        return np.asarray(np.linalg.norm(self._position_residual_mm, axis=1))
 
     @property
     def rms_mm(self) -> float:

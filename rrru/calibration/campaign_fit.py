@@ -90,7 +90,7 @@ def tables(
     truth: the virtual robot's true deviations by the mechanism's names, or None where they are unknown.
     """
     names = ("calibrations", "parameters", "correlations", "observability")
-    frames: dict[str, list] = {name: [] for name in names}
+    frames: dict[str, list[pd.DataFrame]] = {name: [] for name in names}
     for (calibration, method), fit in fits.items():
         label = {"campaign": campaign, "calibration": calibration}
         parts = {"calibrations": _calibration_row(fit), "parameters": _parameter_rows(fit, method, truth or {})}

@@ -48,13 +48,13 @@ class Identifiability:
     @property
     def unseen(self) -> np.ndarray:
         """Flags (p,) of parameters with a part in a direction that the points do not determine."""
-        return (self.directions[self.rank :] ** 2).sum(axis=0) > 1e-8
+        return np.asarray((self.directions[self.rank :] ** 2).sum(axis=0) > 1e-8)
 
     def covariance(self, noise_mm: float) -> np.ndarray:
         """Covariance (p, p) of the parameters for noise of `noise_mm` per axis; inf variance for unseen parameters."""
         seen = slice(0, self.rank)
         half = self.directions[seen].T * self.scale[:, None] / self.singular_values[seen]
-        result = noise_mm**2 * half @ half.T
+        result = np.asarray(noise_mm**2 * half @ half.T)
         result[self.unseen, self.unseen] = np.inf
         return result
 
@@ -73,7 +73,7 @@ class Identifiability:
         flat = jacobian.reshape(-1, len(self.scale)) @ basis
         bread = np.linalg.inv(flat.T @ (curvature.reshape(-1, 1) * flat))
         half = basis @ bread @ (flat * influence.reshape(-1, 1)).T
-        result = np.sqrt((half**2).sum(axis=1))
+        result = np.asarray(np.sqrt((half**2).sum(axis=1)))
         result[self.unseen] = np.inf
         return result
 
@@ -82,7 +82,7 @@ class Identifiability:
         covariance = self.covariance(1.0)
         deviation = np.sqrt(np.diag(covariance))
         with np.errstate(invalid="ignore"):
-            return covariance / np.outer(deviation, deviation)
+            return np.asarray(covariance / np.outer(deviation, deviation))
 
     def indices(self) -> dict[str, float]:
         """Observability indices O1 to O5 by name; 0 where a direction is not determined."""

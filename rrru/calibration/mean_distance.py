@@ -56,7 +56,7 @@ def least_mean_distance(residuals: TargetPositions, start: npt.ArrayLike, noise_
 
 def _objective(
     residuals: TargetPositions, start: np.ndarray, directions: np.ndarray
-) -> tuple[Callable, Callable, Callable]:
+) -> tuple[Callable[[np.ndarray], float], Callable[[np.ndarray], np.ndarray], Callable[[np.ndarray], np.ndarray]]:
     """Mean distance at start + directions q, its gradient and its Hessian, as functions of q."""
     rank = directions.shape[1]
 
@@ -72,16 +72,16 @@ def _objective(
         return distance, np.einsum("na,nap->np", residual / distance[:, None], jacobian), jacobian
 
     def value(q: np.ndarray) -> float:
-        return parts(q.tobytes())[0].mean()
+        return float(parts(q.tobytes())[0].mean())
 
     def gradient(q: np.ndarray) -> np.ndarray:
-        return parts(q.tobytes())[1].mean(axis=0)
+        return np.asarray(parts(q.tobytes())[1].mean(axis=0))
 
     def hessian(q: np.ndarray) -> np.ndarray:
         distance, along, jacobian = parts(q.tobytes())
         weighted = jacobian / np.sqrt(distance[: len(jacobian)])[:, None, None]
         flat, along = weighted.reshape(-1, rank), along / np.sqrt(distance)[:, None]
-        return (flat.T @ flat - along.T @ along) / len(residuals)
+        return np.asarray((flat.T @ flat - along.T @ along) / len(residuals))
 
     return value, gradient, hessian
 

@@ -1,8 +1,13 @@
 """Backlash of screws: measured and compensated, and the repeatability (paper B, 3.1.1). Lengths in mm."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
+import pandas as pd
+
+from rrru.arrays import FloatArray
 
 
 @dataclass(frozen=True)
@@ -15,7 +20,7 @@ class Width:
     standard_error_mm: float
 
 
-def measured_width(record, lead_mm):
+def measured_width(record: pd.DataFrame, lead_mm: float) -> Width:
     """Width from a bench's record (`rrru.simulation.screw.encoder_record`), eq. (19).
 
     # ASSUME the body of eq. (19) is lost. Our reading: at the same commanded place the carriage is further back by the
@@ -33,7 +38,7 @@ def measured_width(record, lead_mm):
     return Width(0.5 * (first + second), first, second, float(mean.std(ddof=1) / np.sqrt(len(mean))))
 
 
-def compensated(values_mm, widths_mm):
+def compensated(values_mm: FloatArray, widths_mm: Sequence[float] | FloatArray) -> FloatArray:
     """Drive commands (N, 3) for slider positions (N, 3) in the order driven: ahead by half the backlash.
 
     The command changes by the whole width at a reversal. A slider at rest keeps the side that it came from; before its
@@ -50,7 +55,7 @@ def compensated(values_mm, widths_mm):
     return result
 
 
-def repeatability(values_mm):
+def repeatability(values_mm: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
     """Standard deviations (3,) of slider positions (k repeats, n places, 3) about each place's mean, and travel (3,).
 
     # ASSUME eq. (20) and Fig. 8 are lost: sigma is the standard deviation over the repeats pooled over the places, K

@@ -1,15 +1,20 @@
 """Errors of every trajectory under every calibration: by its model, and driven again. Lengths in mm, angles in rad."""
 
 import logging
+from collections.abc import Callable
 from fnmatch import fnmatchcase
 
 import numpy as np
 import pandas as pd
 
+from rrru.arrays import FloatArray
 from rrru.calibration.campaign_fit import deviation_vector
 from rrru.campaign import measurements as rows
 from rrru.errors import SimulationError, UnreachableError
+from rrru.kinematics.robot import Robot
 
+# measurements that a controller makes, positions (n, 3) to actuator values
+Drive = Callable[[Callable[[FloatArray], FloatArray]], pd.DataFrame]
 GROUPS = {"all_lines": "line_*", "all": "*"}
 # the standard asks for 30 cycles; fewer than three do not determine a standard deviation
 _FEWEST_REPEATS = 3
@@ -18,7 +23,9 @@ _ERROR = ["error_x_mm", "error_y_mm", "error_z_mm"]
 _TANGENT = ["tangent_x", "tangent_y", "tangent_z"]
 
 
-def under_calibrations(measurements, mechanism, parameters, drive=None):
+def under_calibrations(
+    measurements: pd.DataFrame, mechanism: Robot, parameters: pd.DataFrame, drive: Drive | None = None
+) -> pd.DataFrame:
     """Rows of `errors` before any calibration and under every one of a `parameters` frame.
 
     drive: makes measurements with a controller, positions (n, 3) to actuator values; None where the robot cannot be
@@ -38,12 +45,12 @@ def under_calibrations(measurements, mechanism, parameters, drive=None):
     return pd.concat(frames, ignore_index=True)
 
 
-def before(measurements):
+def before(measurements: pd.DataFrame) -> pd.DataFrame:
     """Rows of `errors` before any calibration: measured minus commanded position of the tool."""
     return _errors(measurements, rows.command(measurements)).assign(calibration="none", method="none", mode="before")
 
 
-def model_residual(measurements, mechanism, deviations):
+def model_residual(measurements: pd.DataFrame, mechanism: Robot, deviations: FloatArray) -> pd.DataFrame:
     """Measured position minus that of the calibrated model for the commanded values: `errors` without names."""
     actuators, command = rows.actuators(measurements, mechanism), rows.command(measurements)
     if (readings := rows.readings(measurements)) is None:
@@ -52,7 +59,7 @@ def model_residual(measurements, mechanism, deviations):
     return _errors(measurements, mechanism.measured(mechanism.solve(actuators, command, twists), twists, readings))
 
 
-def closed_loop(drive, mechanism, deviations):
+def closed_loop(drive: Drive, mechanism: Robot, deviations: FloatArray) -> pd.DataFrame:
     """Measured minus commanded position where the robot is driven again, as `errors` without names.
 
     The controller sends the actuator values with which the calibrated model lands on the target.
@@ -61,14 +68,14 @@ def closed_loop(drive, mechanism, deviations):
     return _errors(measurements, rows.command(measurements))
 
 
-def _errors(measurements, expected):
+def _errors(measurements: pd.DataFrame, expected: FloatArray) -> pd.DataFrame:
     """Measured minus expected positions (n, 3), point by point; null at points that fits may not use."""
     error = np.where(rows.usable(measurements)[:, None], rows.measured(measurements) - expected, np.nan)
     columns = rows.vector_columns("error", error)
     return measurements[["run", "trajectory", "point"]].assign(**columns, error_mm=np.linalg.norm(error, axis=1))
 
 
-def summarise(errors, measurements):
+def summarise(errors: pd.DataFrame, measurements: pd.DataFrame) -> pd.DataFrame:
     """Rows of `error_summary`: sizes, and accuracies after ISO 9283, per calibration and trajectory.
 
     errors: rows of `errors` of one campaign; besides every trajectory the groups "all_lines" and "all" are summed up.
@@ -89,7 +96,7 @@ def summarise(errors, measurements):
     return pd.DataFrame(result)
 
 
-def _path_geometry(measurements):
+def _path_geometry(measurements: pd.DataFrame) -> pd.DataFrame:
     """Per run and point: the commanded path's unit tangent (n, 3) and the number of the station.
 
     Points at one station are passed under the same conditions: trajectory, place, direction, speed and payload.
@@ -108,7 +115,7 @@ def _path_geometry(measurements):
     return frame[["run", "point"]].assign(station=station, **dict(zip(_TANGENT, tangent.T, strict=True)))
 
 
-def _about_barycentres(known):
+def _about_barycentres(known: pd.DataFrame) -> pd.DataFrame:
     """The quantities of ISO 9283 for every row with an error: its size, passes of its station, AP, AT and RP there.
 
     AP: distance between commanded position and barycentre of the attained ones. AT: the same across the path only (the
@@ -129,7 +136,7 @@ def _about_barycentres(known):
     )
 
 
-def _statistics(judged):
+def _statistics(judged: FloatArray) -> dict[str, float]:
     """Count, sizes and largest ISO 9283 numbers of rows (n, 5) of `_about_barycentres`, null where there is none."""
     count = len(judged)
     size, repeats, pose, path, scatter = (judged if count else np.full((1, 5), np.nan)).T

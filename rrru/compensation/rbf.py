@@ -13,10 +13,14 @@ position p - dp; here it answers with dp alone, so that narrow Gaussians need no
 table ptt_training follows both).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 from scipy.spatial.distance import cdist
+
+from rrru.arrays import FloatArray, IntArray
 
 # the least share of a neuron's answers that is more than rounding
 ROUNDING = 1e-12
@@ -26,12 +30,12 @@ ROUNDING = 1e-12
 class Network:
     """A trained network: centres (k, 3), weights (k, q), threshold (q,), spread in mm."""
 
-    centres_mm: np.ndarray
-    weights: np.ndarray
-    threshold: np.ndarray
+    centres_mm: FloatArray
+    weights: FloatArray
+    threshold: FloatArray
     spread_mm: float
 
-    def __call__(self, points_mm):
+    def __call__(self, points_mm: npt.ArrayLike) -> FloatArray:
         """Answers (n, q) at points (n, 3)."""
         return answers(points_mm, self.centres_mm, self.spread_mm) @ self.weights + self.threshold
 
@@ -40,17 +44,26 @@ class Network:
 class Growth:
     """Rows (k,) of the training points in the order taken, and mean squared errors (k + 1,), without a neuron first."""
 
-    order: np.ndarray
-    train_mse: np.ndarray
-    check_mse: np.ndarray
+    order: IntArray
+    train_mse: FloatArray
+    check_mse: FloatArray
 
 
-def answers(points_mm, centres_mm, spread_mm):
+def answers(points_mm: npt.ArrayLike, centres_mm: FloatArray, spread_mm: float) -> FloatArray:
     """Answers (n, k) of Gaussian neurons with centres (k, 3) at points (n, 3): one half at the spread's distance."""
-    return np.exp(-np.log(2.0) * cdist(points_mm, centres_mm, "sqeuclidean") / spread_mm**2)
+    distance: FloatArray = cdist(points_mm, centres_mm, "sqeuclidean")
+    return np.asarray(np.exp(-np.log(2.0) * distance / spread_mm**2))
 
 
-def grow(points_mm, targets, spread_mm, neurons, new_share=ROUNDING, check_mm=None, check_targets=None):
+def grow(
+    points_mm: FloatArray,
+    targets: FloatArray,
+    spread_mm: float,
+    neurons: int,
+    new_share: float = ROUNDING,
+    check_mm: FloatArray | None = None,
+    check_targets: FloatArray | None = None,
+) -> Growth:
     """Growth on training points (n, 3) and targets (n, q) up to a number of neurons, or until none adds anything.
 
     new_share: share of a neuron's squared answers that must be independent of the neurons before it. An almost
@@ -63,7 +76,7 @@ def grow(points_mm, targets, spread_mm, neurons, new_share=ROUNDING, check_mm=No
     return _grow(every, np.concatenate([targets, check_targets]), neurons, new_share)
 
 
-def _grow(every, targets, neurons, new_share):
+def _grow(every: FloatArray, targets: FloatArray, neurons: int, new_share: float) -> Growth:
     """Growth from the answers (n + m, n) of neurons at the n training points, at these and at m validation points."""
     train = every.shape[1]
     least = new_share * (every[:train] ** 2).sum(axis=0)
@@ -72,7 +85,8 @@ def _grow(every, targets, neurons, new_share):
     basis = every[:train]
     # squared part of every neuron's answers that is orthogonal to the neurons taken
     new, taken = (basis**2).sum(axis=0), np.empty((neurons, len(every)))
-    order, errors = [], [_split_mse(residual, train)]
+    order: list[int] = []
+    errors = [_split_mse(residual, train)]
     while len(order) < neurons:
         left = residual[:train].T @ basis
         gain = np.divide((left * left).sum(axis=0), new, out=np.full(train, -1.0), where=new > least)
@@ -93,7 +107,7 @@ def _grow(every, targets, neurons, new_share):
     return Growth(np.array(order, dtype=int), *np.array(errors).T)
 
 
-def fit(points_mm, targets, spread_mm, order):
+def fit(points_mm: FloatArray, targets: FloatArray, spread_mm: float, order: IntArray) -> Network:
     """Network with the rows `order` of points (n, 3) as centres and the weights that fit the targets (n, q) best."""
     centres = points_mm[order]
     design = answers(points_mm, centres, spread_mm)
@@ -102,7 +116,14 @@ def fit(points_mm, targets, spread_mm, order):
     return Network(centres, weights, level - mean @ weights, float(spread_mm))
 
 
-def validation_mse(points_mm, targets, spread_mm, neurons, folds, new_share=ROUNDING):
+def validation_mse(
+    points_mm: FloatArray,
+    targets: FloatArray,
+    spread_mm: float,
+    neurons: int,
+    folds: IntArray,
+    new_share: float = ROUNDING,
+) -> FloatArray:
     """Cross-validated mean squared error (neurons + 1,) after every neuron.
 
     folds (n,): number of the fold in which each point is held out; a fold without further neurons keeps its last error.
@@ -122,21 +143,30 @@ class Choice:
 
     spread_mm: float
     neurons: int
-    validation_mse: np.ndarray
+    validation_mse: FloatArray
 
 
-def choose(points_mm, targets, spreads_mm, neurons, folds, new_share=ROUNDING):
+def choose(
+    points_mm: FloatArray,
+    targets: FloatArray,
+    spreads_mm: Sequence[float],
+    neurons: int,
+    folds: IntArray,
+    new_share: float = ROUNDING,
+) -> Choice:
     """The Choice of least cross-validated error among spreads (s,), see `validation_mse`."""
     curves = np.array([validation_mse(points_mm, targets, s, neurons, folds, new_share) for s in spreads_mm])
     best, count = np.unravel_index(curves.argmin(), curves.shape)
-    return Choice(float(spreads_mm[best]), int(count), curves)
+    return Choice(float(spreads_mm[int(best)]), int(count), curves)
 
 
-def make_folds(count, folds, generator):
+def make_folds(count: int, folds: int, generator: np.random.Generator) -> IntArray:
     """Fold numbers (count,) of equal share, at random."""
     return generator.permutation(np.arange(count) % folds)
 
 
-def _split_mse(residual, train):
+def _split_mse(residual: FloatArray, train: int) -> list[float]:
     """Mean squared residual of the first `train` rows and of the others, NaN without others."""
-    return [np.vdot(part, part) / part.size if part.size else np.nan for part in (residual[:train], residual[train:])]
+    return [
+        float(np.vdot(part, part)) / part.size if part.size else np.nan for part in (residual[:train], residual[train:])
+    ]

@@ -13,7 +13,8 @@ _CALIBRATION_LABELS = {
     "spiral": "spiral calibration",
     "both": "calibration on both",
 }
-_PARAMETER_LABELS = {
+# symbols of error parameters
+PARAMETER_LABELS = {
     **{f"dtheta{leg}": rf"$\Delta\theta_{leg}$" for leg in (1, 2, 3)},
     **{f"dL{link}": rf"$\Delta L_{link}$" for link in (1, 2, 3)},
     **{f"db{leg}": rf"$\Delta b_{leg}$" for leg in (1, 2, 3)},
@@ -27,11 +28,6 @@ _PARAMETER_LABELS = {
 def calibration_label(calibration):
     """Name of a calibration in a legend."""
     return _CALIBRATION_LABELS.get(calibration, f"calibration on {calibration}")
-
-
-def parameter_label(parameter):
-    """Symbol of an error parameter."""
-    return _PARAMETER_LABELS.get(parameter, parameter)
 
 
 def trajectory_label(trajectory):

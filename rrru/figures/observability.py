@@ -59,7 +59,7 @@ def _weights(axes, part):
             color = "white" if abs(weight) > 0.6 else "black"
             axes.text(column, row, text, ha="center", va="center", fontsize=7.0, color=color, in_layout=False)
     crowded = {"rotation": 90.0, "fontsize": _SMALL} if len(parameters) > _ROOM_FOR else {}
-    axes.set_xticks(range(len(parameters)), [choose.parameter_label(name) for name in parameters], **crowded)
+    axes.set_xticks(range(len(parameters)), [choose.PARAMETER_LABELS.get(name, name) for name in parameters], **crowded)
     axes.set_yticks(range(len(table)), table.index, **({"fontsize": _SMALL} if crowded else {}))
     axes.tick_params(length=0.0)
     axes.set_xlabel("error parameter")

@@ -54,7 +54,8 @@ def workspace(tables, options):
     marks = iter("abcdef")
     for row, grid in zip(panels, grids, strict=True):
         for axes, (measure, meaning) in zip(row, _MEASURES.items(), strict=True):
-            image = _panel(axes, grid, measure)
+            places = grid.across_mm, grid.up_mm
+            image = draw_measure(axes, places, grid.fields[measure], grid.fields["constraint_determinant"])
             _trajectories(axes, points, grid)
             axes.set_title(f"({next(marks)}) {meaning}, {grid.place}")
             axes.set_xlabel(f"{grid.across} (mm)")
@@ -139,24 +140,27 @@ def _points(tables, campaign):
     return paths.merge(singular, on=["run", "point"], how="left", validate="one_to_one")
 
 
-def _panel(axes, grid, measure):
-    """One measure over a slice, hatched out of reach, with the zero line of the constraint determinant."""
-    across, up = grid.across_mm, grid.up_mm
-    half = [np.diff(values).mean() / 2.0 for values in (across, up)]
+def draw_measure(axes, places_mm, measure, line=None, levels=_LEVELS):
+    """One measure over a slice (vertical, horizontal) as an image, hatched out of reach; returns the image.
+
+    places_mm: horizontal and vertical coordinates; line: field whose zero line is drawn where it changes its sign.
+    """
+    across, up = places_mm
+    half = [np.diff(values).mean() / 2.0 for values in places_mm]
     axes.patch.set(facecolor="white", edgecolor="#cccccc", hatch="////", linewidth=0.0)
     image = axes.imshow(
-        np.ma.masked_invalid(grid.fields[measure]),
+        np.ma.masked_invalid(measure),
         extent=(across[0] - half[0], across[-1] + half[0], up[0] - half[1], up[-1] + half[1]),
         origin="lower",
         cmap=style.MEASURE,
-        norm=BoundaryNorm(_LEVELS, 256),
+        norm=BoundaryNorm(levels, 256),
         interpolation="none",
         aspect="equal",
     )
-    determinant = np.ma.masked_invalid(grid.fields["constraint_determinant"])
-    if determinant.count() and determinant.min() < 0.0 < determinant.max():
+    values = np.ma.masked_invalid([] if line is None else line)
+    if values.count() and values.min() < 0.0 < values.max():
         for color, width in (("white", 2.2), (style.VERMILION, 1.2)):
-            axes.contour(across, up, determinant, levels=[0.0], colors=[color], linewidths=width)
+            axes.contour(across, up, values, levels=[0.0], colors=[color], linewidths=width)
     return image
 
 

@@ -1,15 +1,18 @@
 """The genetic algorithm on the calibrations of one campaign, compared with the optimum that it should find."""
 
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from time import perf_counter
 
 import numpy as np
 import pandas as pd
 
-from rrru.calibration.calibrate import calibrate
+from rrru.calibration.calibrate import Calibration, calibrate
 from rrru.calibration.mean_distance import least_mean_distance
+from rrru.estimation.observations.target_positions import TargetPositions
 from rrru.genetic.algorithm import minimise
 from rrru.genetic.settings import GeneticSettings
+from rrru.parameters import Parameter
 from rrru.seeds import run_seed
 
 
@@ -20,10 +23,12 @@ class Runs:
     settings: GeneticSettings
     seeds: int
     study_seed: int
-    labels: tuple = ()
+    labels: tuple[str, ...] = ()
 
 
-def study_set(searched, identified, calibration, runs):
+def study_set(
+    searched: TargetPositions, identified: TargetPositions, calibration: str, runs: Runs
+) -> dict[str, pd.DataFrame]:
     """Frames by table name, without the campaign's name: the Runs on one calibration set, called `calibration`.
 
     searched, identified: Residuals of its points under the searched and under the identifiable parameters, of the
@@ -34,7 +39,8 @@ def study_set(searched, identified, calibration, runs):
     best, polish_seconds = _timed(lambda: least_mean_distance(identified, fit.deviations))
     # the compiled objective is loaded before anything is timed
     searched.mean_distance(parameters.nominal[None])
-    frames, seconds = {"genetic": [], "genetic_history": [], "genetic_parameters": []}, []
+    frames: dict[str, list[pd.DataFrame]] = {"genetic": [], "genetic_history": [], "genetic_parameters": []}
+    seconds = []
     for number in range(1, runs.seeds + 1):
         seed = run_seed(runs.study_seed, "genetic", *runs.labels, calibration, number)
         start = perf_counter()
@@ -60,13 +66,13 @@ def study_set(searched, identified, calibration, runs):
     return {name: frame.assign(calibration=calibration) for name, frame in tables.items()}
 
 
-def parameter_rows(found):
+def parameter_rows(found: Mapping[Parameter, float]) -> pd.DataFrame:
     """Columns parameter, unit and value of {Parameter: value}."""
     rows = [(parameter.name, parameter.unit, value) for parameter, value in found.items()]
     return pd.DataFrame(rows, columns=["parameter", "unit", "value"])
 
 
-def typical_parameters(runs, found, names):
+def typical_parameters(runs: pd.DataFrame, found: pd.DataFrame, names: Iterable[str]) -> pd.DataFrame:
     """Rows of `parameters` for method "genetic": of each calibration the run of (lower) median objective.
 
     runs, found: rows of `genetic` and `genetic_parameters` of one campaign; names: of the parameters. A single run is
@@ -81,7 +87,13 @@ def typical_parameters(runs, found, names):
     return rows.assign(method="genetic")[["calibration", "method", "parameter", "value"]]
 
 
-def against_least_squares(runs, found, calibrations, parameters, truth):
+def against_least_squares(
+    runs: pd.DataFrame,
+    found: pd.DataFrame,
+    calibrations: pd.DataFrame,
+    parameters: pd.DataFrame,
+    truth: Mapping[str, float] | None,
+) -> pd.DataFrame:
     """Rows of `genetic_against_least_squares` of one campaign (without its name).
 
     runs, found, calibrations, parameters: rows of `genetic`, `genetic_parameters`, `calibrations` and `parameters` of
@@ -110,26 +122,27 @@ def against_least_squares(runs, found, calibrations, parameters, truth):
     return compared.assign(excess=[_excess(*pair) for pair in zip(compared["mean_mm"], optima, strict=True)])
 
 
-def _excess(value, optimum):
+def _excess(value: float, optimum: float) -> float:
     """Share by which a mean distance exceeds the least one; NaN where that is zero up to rounding."""
     return value / optimum - 1.0 if optimum > 1e-9 else np.nan
 
 
-def _parameter_error(rows, truth):
+def _parameter_error(rows: pd.DataFrame, truth: Mapping[str, float] | None) -> dict[str, float]:
     """RMS deviation of angles and of lengths from the truth over rows of parameters; NaN where it is unknown.
 
     Also NaN where the legs of the real robot differ, so that there is no true value.
     """
-    units = {} if truth is None else rows.groupby("parameter")["unit"].first()
+    truth = truth or {}
+    units = rows.groupby("parameter")["unit"].first() if truth else {}
     error = {}
     for key, unit in (("angle_error_rad", "rad"), ("length_error_mm", "mm")):
-        names = [name for name in truth or () if units[name] == unit]
+        names = [name for name in truth if units[name] == unit]
         apart = [rows.loc[rows["parameter"] == name, "value"].to_numpy() - truth[name] for name in names]
         error[key] = float(np.sqrt(np.mean(np.square(apart)))) if names else np.nan
     return error
 
 
-def _timed(function):
+def _timed(function: Callable[[], Calibration]) -> tuple[Calibration, float]:
     """Result of a call and the wall time in s of a second one, compilation excluded."""
     result, start = function(), perf_counter()
     function()

@@ -8,8 +8,11 @@ negative weights of the worse half. Genes are in 0..1.
 
 import numpy as np
 
+from rrru.arrays import FloatArray
 from rrru.genetic import operators
+from rrru.genetic.plan import Bounds
 from rrru.genetic.result import GeneticResult, means
+from rrru.genetic.settings import GeneticSettings, Objective
 
 # mean and standard deviation of the first genes: the middle of the bounds, at the nominal robot; 0.3 as in the tutorial
 _FIRST_MEAN, _FIRST_SIGMA = 0.5, 0.3
@@ -17,7 +20,7 @@ _FIRST_MEAN, _FIRST_SIGMA = 0.5, 0.3
 _MIN_SIGMA = 1e-12
 
 
-def run(rate, bounds, settings, seed):
+def run(rate: Objective, bounds: Bounds, settings: GeneticSettings, seed: int) -> GeneticResult:
     """GeneticResult of a checked objective within Bounds; see `algorithm.minimise`.
 
     Of GeneticSettings it uses the population, all islands together, and the stop criteria. Genes drawn outside of the
@@ -25,7 +28,10 @@ def run(rate, bounds, settings, seed):
     """
     generator, search = np.random.default_rng(seed), Distribution(bounds.low.size, sum(settings.populations))
     stall = settings.stall_generations, settings.stall_tolerance
-    best, found, mean, stopped = [], [], [], "generations"
+    best: list[float] = []
+    found: list[FloatArray] = []
+    mean: list[FloatArray] = []
+    stopped = "generations"
     for generation in range(settings.generations + 1):
         genes = np.clip(search.draw(generator), 0.0, 1.0)
         score = rate(operators.decoded(genes, bounds))
@@ -56,7 +62,7 @@ class Distribution:
     axes (p, p), in columns, and the square roots of its eigenvalues lengths (p,).
     """
 
-    def __init__(self, genes, count):
+    def __init__(self, genes: int, count: int) -> None:
         self.count, self.mean, self.sigma = count, np.full(genes, _FIRST_MEAN), _FIRST_SIGMA
         self.generation = 0
         share = np.log((count + 1) / 2) - np.log(np.arange(1, count // 2 + 1))
@@ -78,16 +84,16 @@ class Distribution:
         self.covariance, self.axes, self.lengths = np.eye(genes), np.eye(genes), np.ones(genes)
 
     @property
-    def largest_sd(self):
+    def largest_sd(self) -> float:
         """Largest standard deviation along an axis."""
-        return self.sigma * self.lengths.max()
+        return float(self.sigma * self.lengths.max())
 
-    def draw(self, generator):
+    def draw(self, generator: np.random.Generator) -> FloatArray:
         """Genes (n, p), also outside of the bounds."""
         normal = generator.standard_normal((self.count, len(self.mean)))
         return self.mean + self.sigma * (normal * self.lengths) @ self.axes.T
 
-    def learn(self, ranked):
+    def learn(self, ranked: FloatArray) -> None:
         """Update the distribution from genes (n, p), the best first."""
         steps = (ranked[: len(self.weights)] - self.mean) / self.sigma
         mean_step = self.weights @ steps

@@ -7,19 +7,24 @@ of another. Sources: Global Optimization Toolbox, "Genetic Algorithm Options" an
 Works"; J. E. Baker, "Reducing bias and inefficiency in the selection algorithm", ICGA 1987 (stochastic uniform).
 """
 
-import numba
+from typing import Any
+
 import numpy as np
+
+from rrru.arrays import FloatArray, IntArray
+from rrru.genetic.plan import Bounds, Rules
+from rrru.kinematics.typed_numba import njit
 
 # expected number of the best individual's places over the average's ("shift linear" scaling's default)
 SURVIVAL_RATE = 2.0
 # adaptive feasible mutation's steps, in units of the range: roots of a mesh between 1 and the constraint tolerance 1e-3
 LARGEST_STEP, SMALLEST_STEP = 1.0, 1e-3**0.5
 
-_compiled = numba.njit(cache=True, error_model="numpy")
+_compiled = njit(cache=True, error_model="numpy")
 
 
 @_compiled
-def shift_linear(score, parents):
+def shift_linear(score: FloatArray, parents: int) -> FloatArray:
     """Expected numbers of places (n,) of individuals with scores (n,) among `parents` parents ("shift linear" scaling).
 
     Affine in the score, with mean d = parents / n over the feasible individuals; the best gets SURVIVAL_RATE d, unless
@@ -55,7 +60,7 @@ def shift_linear(score, parents):
 
 
 @_compiled
-def stochastic_uniform(expectation, count, offset):
+def stochastic_uniform(expectation: FloatArray, count: int, offset: float) -> IntArray:
     """Indices, shape (count,), of parents: equal steps along a line of segments as long as the expectations (n,).
 
     `offset` in 0..1 is the first position in units of the step; no individual without expectation is chosen.
@@ -75,7 +80,7 @@ def stochastic_uniform(expectation, count, offset):
 
 
 @_compiled
-def shuffled(values, uniform):
+def shuffled(values: IntArray, uniform: FloatArray) -> IntArray:
     """The values, shape (n,), in an order drawn by n uniform numbers in 0..1 (Fisher and Yates)."""
     result = values.copy()
     for i in range(values.size - 1, 0, -1):
@@ -85,7 +90,7 @@ def shuffled(values, uniform):
 
 
 @_compiled
-def scattered(population, parents, coin, children):
+def scattered(population: FloatArray, parents: IntArray, coin: FloatArray, children: FloatArray) -> None:
     """Write children (k, p) of consecutive pairs among the parents' indices (2 k,), with a population of shape (n, p).
 
     A gene is the first parent's where coin (k, p) < 1/2, else the second's.
@@ -96,7 +101,7 @@ def scattered(population, parents, coin, children):
 
 
 @_compiled
-def gaussian(population, parents, step, mutants):
+def gaussian(population: FloatArray, parents: IntArray, step: FloatArray, mutants: FloatArray) -> None:
     """Write mutants (k, p) of parents' indices (k,) in a population (n, p): moved by step (k, p), folded to 0..1."""
     # ASSUME MATLAB's Gaussian mutation knows no bounds. Reflected there: with steps of one range, clipping would put
     # most mutated genes onto a bound, and finds worse minima.
@@ -107,7 +112,7 @@ def gaussian(population, parents, step, mutants):
 
 
 @_compiled
-def feasible(population, parents, steps, mutants):
+def feasible(population: FloatArray, parents: IntArray, steps: FloatArray, mutants: FloatArray) -> None:
     """Write mutants (k, p) of parents' indices (k,): moved by the first of steps (k, t, p) that stays in 0..1.
 
     A parent for which none does is copied.
@@ -122,7 +127,7 @@ def feasible(population, parents, steps, mutants):
 
 
 @_compiled
-def adapted(size, best, generation):
+def adapted(size: float, best: FloatArray, generation: int) -> float:
     """Size of the steps to a generation, from `size` to the one before: doubled after a better one, else halved."""
     if generation <= 2:
         return LARGEST_STEP
@@ -131,7 +136,7 @@ def adapted(size, best, generation):
 
 
 @_compiled
-def ranked(score):
+def ranked(score: FloatArray) -> IntArray:
     """Indices (n,) of scores (n,) from the best to the worst, stable; NumPy's sort takes seconds to compile."""
     order = np.arange(score.size)
     for i in range(1, score.size):
@@ -144,7 +149,14 @@ def ranked(score):
 
 
 @_compiled
-def next_population(population, score, plan, draws, children, known):
+def next_population(
+    population: FloatArray,
+    score: FloatArray,
+    plan: IntArray,
+    draws: tuple[FloatArray, FloatArray, float],
+    children: FloatArray,
+    known: FloatArray,
+) -> None:
     """Write the next population to children (n, p) and what is known of its scores (n,): the elites', else NaN.
 
     draws: uniform random numbers and moves (mutants, t, p), see `plan`, and the moves' size. Each island's rows are its
@@ -179,7 +191,7 @@ def next_population(population, score, plan, draws, children, known):
 
 
 @_compiled
-def look_up(children, known, population, score):
+def look_up(children: FloatArray, known: FloatArray, population: FloatArray, score: FloatArray) -> None:
     """Give children that equal an individual of the population (n, p) its score, in place."""
     for i in range(len(children)):
         k = 0
@@ -193,13 +205,13 @@ def look_up(children, known, population, score):
 
 
 @_compiled
-def decoded(genes, bounds):
+def decoded(genes: FloatArray, bounds: Bounds) -> FloatArray:
     """Parameters of genes in 0..1; rounding must not lead beyond the upper bound."""
     return np.minimum(bounds.low + genes * (bounds.high - bounds.low), bounds.high)
 
 
 @_compiled
-def has_stalled(best, stall_generations, tolerance):
+def has_stalled(best: FloatArray, stall_generations: int, tolerance: float) -> bool:
     """Whether the best objective's average relative change over the last `stall_generations` = S is <= tolerance.
 
     best: best objective of the initial population and after each of g generations. With f_k after generation k the
@@ -211,11 +223,22 @@ def has_stalled(best, stall_generations, tolerance):
     if stall_generations == 0 or best.size - 1 < stall_generations:
         return False
     before, now = best[-1 - stall_generations], best[-1]
-    return (before - now) / stall_generations <= tolerance * max(1.0, abs(now))
+    return bool((before - now) / stall_generations <= tolerance * max(1.0, abs(now)))
 
 
 @_compiled
-def advance(objective, legs, points, bounds, rules, draws, done, populations, scores, best):
+def advance(
+    objective: Any,
+    legs: FloatArray | None,
+    points: FloatArray | None,
+    bounds: Bounds,
+    rules: Rules,
+    draws: tuple[FloatArray, FloatArray, FloatArray],
+    done: int,
+    populations: FloatArray,
+    scores: FloatArray,
+    best: FloatArray,
+) -> int:
     """Breed and rate as many generations as there are draws, fewer where the run stalls; returns their number.
 
     objective: writes the values (m,) of parameters (m, p), see `rrru.kinematics.compiled`; bounds, rules: see `plan`;

@@ -8,14 +8,18 @@ generations as the migration interval: PyGAD continues where it stopped when it 
 """
 
 import logging
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
+from rrru.arrays import FloatArray
 from rrru.errors import ConfigError, FitError
 from rrru.genetic import operators
-from rrru.genetic.islands import migrate
-from rrru.genetic.plan import make_plan, migrants_of
+from rrru.genetic.plan import Bounds, make_plan, migrants_of, migrate
 from rrru.genetic.result import GeneticResult, means
+from rrru.genetic.settings import GeneticSettings, Objective
 
 # PyGAD logs every exception before raising it again; the exception is enough
 _LOGGER = logging.getLogger(__name__)
@@ -23,8 +27,8 @@ _LOGGER.addHandler(logging.NullHandler())
 _LOGGER.propagate = False
 
 
-def run(objective, bounds, settings, seed):
-    """GeneticResult of an objective, see `algorithm.minimise`, within a Bounds.
+def run(objective: Objective, bounds: Bounds, settings: GeneticSettings, seed: int) -> GeneticResult:
+    """GeneticResult of an objective, see `algorithm.minimise`, within Bounds.
 
     Stalled is PyGAD's "saturate": the best objective stayed the same. Raises FitError where no individual is feasible,
     and ConfigError where PyGAD is not installed.
@@ -49,7 +53,7 @@ def run(objective, bounds, settings, seed):
     return result
 
 
-def _pygad():
+def _pygad() -> Any:
     """The library, which only this reading of the paper needs."""
     try:
         import pygad
@@ -62,9 +66,11 @@ def _pygad():
 class _Island:
     """One PyGAD instance and its histories, from the initial population on."""
 
-    def __init__(self, objective, bounds, settings, size, seed):
+    def __init__(self, objective: Objective, bounds: Bounds, settings: GeneticSettings, size: int, seed: int) -> None:
         self.objective, self.bounds, self.asked = objective, bounds, 0
-        self.genes, self.scores, self.rated = [], [], []
+        self.genes: list[FloatArray] = []
+        self.scores: list[FloatArray] = []
+        self.rated: list[int] = []
         # the only island may stop by itself
         alone = len(settings.populations) == 1 and settings.stall_generations
         self.ga = _pygad().GA(
@@ -94,11 +100,11 @@ class _Island:
         self.asked = 0
 
     @property
-    def done(self):
+    def done(self) -> int:
         """Generations done."""
         return len(self.scores) - 1
 
-    def advance(self, generations):
+    def advance(self, generations: int) -> None:
         """Run so many generations more."""
         self.ga.num_generations = generations
         try:
@@ -106,16 +112,16 @@ class _Island:
         except ValueError as error:
             raise FitError(f"PyGAD's selection: {error}") from error
 
-    def _fitness(self, _ga, genes, _rows):
+    def _fitness(self, _ga: Any, genes: FloatArray, _rows: Any) -> FloatArray:
         """PyGAD's fitness, minus the objective, of a batch."""
         self.asked += len(genes)
         return -self.objective(operators.decoded(np.asarray(genes, dtype=float), self.bounds))
 
-    def _note(self, ga):
+    def _note(self, ga: Any) -> None:
         """Keep a generation."""
         self._keep(ga.population, ga.last_generation_fitness)
 
-    def _keep(self, population, fitness):
+    def _keep(self, population: FloatArray, fitness: npt.ArrayLike) -> None:
         """Keep the best individual, all scores and the number of evaluations so far."""
         score = -np.asarray(fitness, dtype=float)
         self.genes.append(population[score.argmin()].copy())
@@ -123,7 +129,7 @@ class _Island:
         self.rated.append(self.asked)
 
 
-def _joined(islands, bounds):
+def _joined(islands: Sequence[_Island], bounds: Bounds) -> GeneticResult:
     """The islands' histories as one GeneticResult."""
     scores = np.stack([np.concatenate(row) for row in zip(*(island.scores for island in islands), strict=True)])
     best = np.stack([[row.min() for row in island.scores] for island in islands])

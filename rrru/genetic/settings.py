@@ -1,13 +1,18 @@
 """Settings of the genetic algorithm, as the configuration names them."""
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
 from numbers import Integral, Real
+from typing import Any, Self
 
 import numpy as np
 
+from rrru.arrays import FloatArray
 from rrru.errors import ConfigError
 from rrru.genetic.plan import elite_count
 
+# values (m,) of individuals (m, p)
+Objective = Callable[[FloatArray], FloatArray]
 # readings of the paper: MATLAB's step with its Gaussian or its adaptive feasible mutation, and PyGAD's own operators;
 # and CMA-ES, which needs a fraction of the evaluations
 OPERATORS = ("matlab_gaussian", "matlab_adaptive", "pygad", "cma_es")
@@ -49,7 +54,7 @@ class GeneticSettings:
     mutation_shrink: float = 1.0
     operators: str = "matlab_gaussian"
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if self.operators not in OPERATORS:
             raise ConfigError(f"operators is {self.operators!r}; allowed: {', '.join(OPERATORS)}")
         for name, (kind, lowest, highest, allowed) in _ALLOWED.items():
@@ -67,11 +72,11 @@ class GeneticSettings:
             raise ConfigError(f"elite_share is {self.elite_share!r}; allowed: {allowed}")
 
     @classmethod
-    def from_config(cls, section, **changes):
+    def from_config(cls, section: Mapping[str, Any], **changes: Any) -> Self:
         """From the configuration's `genetic` section with some values replaced."""
         return cls(**{item.name: section[item.name] for item in fields(cls) if item.name in section} | changes)
 
 
-def is_number(value, kind):
+def is_number(value: Any, kind: type) -> bool:
     """Whether the value is a number of the kind; a truth value is not a number."""
     return isinstance(value, kind) and not isinstance(value, bool)

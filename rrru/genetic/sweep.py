@@ -3,13 +3,18 @@
 Every run goes to its last generation. The result of the same run stopped where it stalls is read from its history.
 """
 
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
+from rrru.arrays import FloatArray
 from rrru.errors import ConfigError
 from rrru.genetic.algorithm import minimise
+from rrru.genetic.settings import GeneticSettings, Objective
+from rrru.parameters import ParameterSet
 from rrru.seeds import run_seed
 
 SWEPT = ("crossover_fraction", "migration_fraction")
@@ -20,7 +25,15 @@ _SIGNIFICANCE = 0.05
 _BOOTSTRAP_RESAMPLES = 1999
 
 
-def run_sweep(objective, parameters, settings, parameter, value, seeds, study_seed=0):
+def run_sweep(
+    objective: Objective,
+    parameters: ParameterSet,
+    settings: GeneticSettings,
+    parameter: str,
+    value: float,
+    seeds: Iterable[int],
+    study_seed: int = 0,
+) -> dict[str, pd.DataFrame]:
     """Frames by table name of the runs of the genetic algorithm at one value of one setting, one per seed number.
 
     objective, settings: see `algorithm.minimise`, but a stalled run continues to the end; parameters: ParameterSet;
@@ -30,11 +43,12 @@ def run_sweep(objective, parameters, settings, parameter, value, seeds, study_se
     """
     if parameter not in SWEPT:
         raise ConfigError(f"swept parameter is {parameter!r}; allowed: {', '.join(SWEPT)}")
-    settings = replace(settings, **{parameter: value})
+    swept: dict[str, Any] = {parameter: value}
+    settings = replace(settings, **swept)
     # PyGAD's "saturate" is equality
     stall = settings.stall_generations, 0.0 if settings.operators == "pygad" else settings.stall_tolerance
     kind = "one" if len(settings.populations) == 1 else "islands"
-    frames = {"sweep_runs": [], "sweep_history": [], "sweep_parameters": []}
+    frames: dict[str, list[pd.DataFrame]] = {"sweep_runs": [], "sweep_history": [], "sweep_parameters": []}
     for number in seeds:
         seed = run_seed(study_seed, parameter, kind, value, number)
         to_end = minimise(objective, parameters.low, parameters.high, replace(settings, stall_generations=0), seed)
@@ -48,7 +62,7 @@ def run_sweep(objective, parameters, settings, parameter, value, seeds, study_se
     return {name: pd.concat(parts, ignore_index=True) for name, parts in frames.items()}
 
 
-def setting_effect(runs):
+def setting_effect(runs: pd.DataFrame) -> pd.DataFrame:
     """Whether the values of a setting differ at all in the objective they reach: one row per SWEEP of a table of runs.
 
     Columns: those of SWEEP, settings (number of values), runs, statistic and p_value of the Kruskal-Wallis test
@@ -74,7 +88,7 @@ def setting_effect(runs):
     return pd.DataFrame(rows)
 
 
-def setting_pairs(runs, seed=0):
+def setting_pairs(runs: pd.DataFrame, seed: int = 0) -> pd.DataFrame:
     """Difference of each setting from the best one: a row per value except the best, of each SWEEP of runs.
 
     Columns: those of SWEEP, value, best_value (lowest median objective), median_mm, difference_mm (of the
@@ -102,7 +116,7 @@ def setting_pairs(runs, seed=0):
     return pd.DataFrame(rows)
 
 
-def _kruskal(group):
+def _kruskal(group: pd.DataFrame) -> dict[str, float]:
     """Kruskal-Wallis test of the objective over the values of a group of runs: statistic, p value, epsilon squared."""
     from scipy import stats
 
@@ -114,7 +128,7 @@ def _kruskal(group):
     return {"statistic": float(test.statistic), "p_value": float(test.pvalue), "epsilon_squared": share}
 
 
-def _median_difference(sample, reference, seed):
+def _median_difference(sample: FloatArray, reference: FloatArray, seed: int) -> dict[str, float]:
     """Difference of the medians and its 95 % percentile-bootstrap interval, each NaN where it is undefined."""
     from scipy import stats
 
@@ -136,7 +150,7 @@ def _median_difference(sample, reference, seed):
     return dict(zip(names, (difference, float(interval.low), float(interval.high)), strict=True))
 
 
-def _holm(p_values):
+def _holm(p_values: Sequence[float]) -> list[float]:
     """P values adjusted by Holm's step-down method (S. Holm 1979), in the order given; SciPy does not have it."""
     corrected, floor = [0.0] * len(p_values), 0.0
     for rank, index in enumerate(np.argsort(p_values, kind="stable")):

@@ -9,7 +9,7 @@ from typing import Any
 from rrru.errors import RrruError
 
 
-def run(main: Callable[[dict, dict, dict], None], snakemake: Any) -> None:
+def run(main: Callable[[dict[str, Any], dict[str, Any], dict[str, Any]], None], snakemake: Any) -> None:
     """Call main(settings, inputs, outputs) with a job's part of the configuration and its files by name.
 
     It logs to the job's file; an RrruError ends the process with its message instead of a traceback.

@@ -21,7 +21,8 @@ def text(facts: dict[str, Any]) -> str:
 
 def read(path: str | Path) -> dict[str, Any]:
     """The facts of a file."""
-    return json.loads(Path(path).read_text())
+    found: dict[str, Any] = json.loads(Path(path).read_text())
+    return found
 
 
 def _plain(value: Any) -> Any:

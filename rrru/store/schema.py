@@ -20,7 +20,7 @@ class Column:
     kind: str
     description: str
     nullable: bool = False
-    allowed: tuple = ()
+    allowed: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -196,7 +196,10 @@ def markdown():
         titles=" | ".join(f"on the {scene.title}, confounded with" for scene in shown),
         rules=" | ".join("---" for _ in shown),
     )
-    rows = [f"| [{name}](#{name}) | {_meaning(name)} | {_cells(name, shown)} |\n" for name in NAMES]
+    rows = []
+    for name in NAMES:
+        confounded_on = " | ".join(_rivals(scene, name) for scene in shown)
+        rows.append(f"| [{name}](#{name}) | {_meaning(name)} | {confounded_on} |\n")
     return "\n".join([head.rstrip("\n") + "\n" + "".join(rows), *map(_section, NAMES)])
 
 
@@ -251,11 +254,6 @@ def _meaning(name):
     return inspect.getdoc(_module(name)).splitlines()[0].partition(": ")[2].rstrip(".")
 
 
-def _cells(name, scenes):
-    """What an effect is confounded with on each scene, as cells of a table."""
-    return " | ".join(_rivals(scene, name) for scene in scenes)
-
-
 def _rivals(scene, name):
     """What an effect is confounded with on a scene, in words."""
     problem = scene.problem()
@@ -277,9 +275,10 @@ def _section(name):
     text = inspect.getdoc(_module(name))
     _, _, body = text.partition("\n")
     body = re.sub(r"^(Assumptions|Source):", r"**\1:**", body.strip(), flags=re.MULTILINE)
-    scenes = _scenes(name)
-    parts = [f"## {name}\n", f"*{_capital(_meaning(name))}.*\n", body + "\n", _sizes(name)]
-    parts.append(f"**The file must hold:** {_needs(name)}.\n")
+    scenes, meaning = _scenes(name), _meaning(name)
+    parts = [f"## {name}\n", f"*{meaning[:1].upper()}{meaning[1:]}.*\n", body + "\n", _sizes(name)]
+    needs = "; ".join(dict.fromkeys(NEEDS[need] for need in _made(name).needs)) or "poses, nothing more"
+    parts.append(f"**The file must hold:** {needs}.\n")
     texts = cause_texts(name)
     parts.append(f"**On the machine:** {texts.inspect} {texts.remedy}\n")
     parts += [f"**Confounded on the {scene.title} with:** {_rivals(scene, name)}.\n" for scene in scenes]
@@ -289,11 +288,6 @@ def _section(name):
     else:
         parts += [f"**On the {scene.title}:** {_rivals(scene, name)}.\n" for scene in SCENES[:_SHOWN]]
     return "\n".join(parts)
-
-
-def _capital(text):
-    """A text with a capital letter."""
-    return text[:1].upper() + text[1:]
 
 
 def _made(name):
@@ -308,11 +302,6 @@ def _two_arms():
     link = {"a_mm": 300.0, "range_deg": [-90.0, 90.0]}
     trunk, hands = [{**link, "alpha_deg": 90.0}, link], {arm: [{**link, "name": arm}] for arm in ("left", "right")}
     return from_dh(trunk, hands=hands, name="two_arms")
-
-
-def _needs(name):
-    """What a file must hold for an effect to be tested, in words."""
-    return "; ".join(dict.fromkeys(NEEDS[need] for need in _made(name).needs)) or "poses, nothing more"
 
 
 def _sizes(name):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rrru.genetic import algorithm, islands, plan
+from rrru.genetic import algorithm, plan
 from rrru.genetic.algorithm import minimise
 from rrru.genetic.settings import GeneticSettings
 
@@ -15,7 +15,7 @@ def _population(sizes, seed=0):
 
 def _migrate(population, score, sizes, fraction):
     rows, leaving = plan.make_plan(sizes, 0.05, 0.8), plan.migrants_of(sizes, fraction)
-    return islands.migrate(population, score, rows, leaving)
+    return plan.migrate(population, score, rows, leaving)
 
 
 def test_islands_lie_one_after_the_other():

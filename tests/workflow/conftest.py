@@ -13,7 +13,7 @@ _CHECKED = "withheld: {field: [field_09], field_answers: answers.csv}\n"
 
 @pytest.fixture(scope="session")
 def shared(tmp_path_factory):
-    """Folder of a whole minimal run on two cores, the check on withheld effects and a twin's search included.
+    """Folder of a whole minimal run on two cores, the check on withheld effects included.
 
     `build/minimal` holds its results, `record` what its scripts have read, `output` what it has said. It is made by the
     first of pytest's workers that asks; the others wait for it.
@@ -34,7 +34,7 @@ def _make(folder):
     (folder / "answers.csv").write_text(_ANSWERS)
     (folder / "field.yaml").write_text(_CHECKED)
     # a rule that takes two cores, see `test_dependencies`
-    targets = ("all", "withheld", "build/minimal/twin/delta.yaml", "report", "--set-threads", "published=2")
+    targets = ("all", "withheld", "report", "--set-threads", "published=2")
     code, output = run(folder, *targets, overlays=(MINIMAL, "field.yaml"), record=folder / "record")
     assert code == 0, output
     (folder / "output").write_text(output)

@@ -1,4 +1,4 @@
-"""The Delta's study from images to errors on the plane, as a user runs it with fewer images, and its twin."""
+"""The Delta's study from images to errors on the plane, as a user runs it with fewer images."""
 
 import re
 
@@ -8,7 +8,7 @@ import pytest
 import yaml
 
 from rrru.robots.delta import Delta
-from rrru.studies.delta import draws, robot_search, views, virtual_delta, vision
+from rrru.studies.delta import draws, views, vision
 from rrru.studies.delta.variants import VARIANTS
 from tests.places import ROOT
 
@@ -125,24 +125,3 @@ def test_dots_that_are_projected_are_those_of_the_rendered_images(results, confi
 def test_the_vision_job_is_given_images_only(shared):
     job = re.search(r"rule delta_vision:\n    input: (.*)\n", (shared / "output").read_text())
     assert job[1] == "build/minimal/delta/images.npz"
-
-
-def test_a_step_of_the_search_stays_near_the_configured_robot(results, config):
-    text = (results / "twin/delta.yaml").read_text()
-    deviations = yaml.safe_load(text)["delta"]["errors"]
-    misfit = float(re.search(r"misfit ([\d.]+)", text)[1])
-    for name, value in deviations.items():
-        reach = config["delta"]["search"]["share"] * (0.02 if name.startswith("dtheta") else 0.3)
-        assert abs(value - config["delta"]["errors"][name]) <= reach + 1e-6
-    # the misfit is that of the four published numbers, medians over the draws
-    poses, tilted = {"counts": [3, 3], "half_mm": [100.0, 90.0]}, {"count": 7}
-    changed = {key: config["delta"][key] | new for key, new in (("poses", poses), ("tilted_views", tilted))}
-    own = config | {"delta": config["delta"] | changed}
-    truth = pd.read_parquet(results / "delta/truth.parquet")
-    noise = draws.centre_noise_px(own, truth, _table(results, "dots"))
-    first = (truth["plane"] == "first").to_numpy()
-    drawn = [one["centre"][first] for one in draws.drawn_errors(own, truth, noise, 2, "search")]
-    small = own | {"delta": own["delta"] | {"errors": deviations}}
-    here = robot_search.numbers(virtual_delta.twin(small), _columns(truth, "command")[first], drawn)
-    published = np.array([0.932, 1.442, 0.211, 0.374])
-    assert misfit == pytest.approx(np.sqrt(np.mean((here / published - 1.0) ** 2)), abs=2e-4)

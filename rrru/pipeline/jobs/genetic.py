@@ -55,7 +55,7 @@ def _runs(settings: Mapping[str, Any], read: Mapping[str, pd.DataFrame], searche
         wide, identified = (
             select(measurements, robot, patterns, calibration["use_near_singularity"]) for robot in robots
         )
-        if wide is not None:
+        if wide is not None and identified is not None:
             results.append(study_set(wide, identified, label, runs))
     frames = {table: pd.concat([part[table] for part in results], ignore_index=True) for table in results[0]}
     truth = setup.true_deviations(robots[1], settings["truth"])

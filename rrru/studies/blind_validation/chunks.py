@@ -56,7 +56,11 @@ def chunks(section):
     members += [Member("noise", noise, k) for noise in NOISES for k in range(section["per_noise"])]
     members += [Member(check, "", k) for check in ("many", "background") for k in range(section[check])]
     members += [Member(AS_ROBOTS_ARE, file, k) for file, k in _in_turns(section)]
-    members += [_of_file(plant, section["files"], k) for plant in PLANTS for k in range(section[plant])]
+    for plant in PLANTS:
+        for k in range(section[plant]):
+            # the files take turns
+            turn, which = divmod(k, len(section["files"]))
+            members.append(Member(plant, section["files"][which], turn + _APART * which))
     # a chunk's robots have the same drives
     files = dict.fromkeys(["", *section["files"], *section["as_robots_are_files"]])
     groups = [[one for one in members if one.file == file] for file in files]
@@ -81,12 +85,6 @@ def _in_turns(section):
     for k in range(section[AS_ROBOTS_ARE]):
         number, turn = divmod(k, len(files))
         yield files[turn], number
-
-
-def _of_file(plant, files, k):
-    """One of the robots of files on a plant: the files take turns."""
-    turn, which = divmod(k, len(files))
-    return Member(plant, files[which], turn + _APART * which)
 
 
 def described(config, members, as_measured=False):

@@ -49,6 +49,10 @@ WEAKEST, STRONGEST, CLEAR, SEEN = 0.1, 10.0, 2.0, 1.5
 FILE_STRENGTHS = (0.7, 10.0)
 # for many causes at once: interval of strengths, and largest non-repeatability over noise
 MANY, MOST_SCATTER = (0.3, 30.0), 5.0
+# by check: the span of strengths, strong enough to be detected where it matters
+_SPANS = {"label": (WEAKEST, STRONGEST), "effect": (CLEAR, STRONGEST), "noise": (SEEN, STRONGEST)}
+_SPANS |= {"background": (SEEN, STRONGEST), "many": MANY, AS_ROBOTS_ARE: MANY}
+_WITH_BACKGROUND = ("many", "background", AS_ROBOTS_ARE)
 # for robots as they are: most causes at once; one in this many robots also has a cause from outside the library
 MOST_CAUSES, OUTSIDE_EVERY = 6, 3
 # errors of geometric parameters, and of joint axes as manufactured, 1 sigma
@@ -88,23 +92,43 @@ def fresh(robot, conditions):
 
 def draw(member, conditions):
     """The 3-RRRU of a Member of the check, see `rrru.studies.blind_validation.chunks`."""
-    kinds = {"effect": _draw_single, "noise": _draw_noisy, "many": _draw_many, "background": _draw_background}
-    kinds[AS_ROBOTS_ARE] = _draw_as_robots_are
-    labels = {"effect": (member.about,), "noise": (member.check, member.about)}.get(member.check, (member.check,))
-    labels = labels if member.check in kinds else ()
-    generator = stream(conditions.seed, "withheld", *labels, member.number)
+    check, about = member.check, member.about
+    own_stream = {"label": (), "effect": (about,), "noise": (check, about)}.get(check, (check,))
+    generator = stream(conditions.seed, "withheld", *own_stream, member.number)
     robot = bare(member.name, generator, conditions)
-    return kinds.get(member.check, _draw_labelled)(member, robot, generator, conditions)
+    if check in _WITH_BACKGROUND:
+        robot = with_background(robot, generator, conditions)
+    if check == "noise":
+        robot = replace(robot, noise=_changed(NOISES[about]))
+    if check == AS_ROBOTS_ARE:
+        robot = replace(robot, noise=noise_not_as_stated(generator))
+    names = _drawn_names(member, generator)
+    if check == "many":
+        robot = replace(robot, noise={"scatter": float(generator.uniform(0.0, MOST_SCATTER))})
+    return _with_causes(robot, names, _SPANS[check], generator, conditions) if names else robot
 
 
-def _draw_labelled(_member, robot, generator, conditions):
-    """A robot with nothing, one effect, two, or a cause from outside."""
-    truth = generator.choice(list(TRUTHS), p=list(TRUTHS.values()))
-    if truth == "none":
-        return robot
-    causes = list(OUTSIDE if truth == "outside" else EFFECTS)
-    names = generator.choice(causes, 2 if truth == "two" else 1, replace=False).tolist()
-    return _with_causes(robot, names, (WEAKEST, STRONGEST), generator, conditions)
+def _drawn_names(member, generator):
+    """Names of the causes of a 3-RRRU.
+
+    label: nothing, one effect, two, or a cause from outside. effect: the one that the library lacks. noise and
+    background: one effect in every second robot. many: three to six effects, in every second robot also a cause from
+    outside. as_robots_are: one to six effects, in every third robot also a cause from outside.
+    """
+    if member.check == "effect":
+        return [member.about]
+    if member.check == "label":
+        truth = generator.choice(list(TRUTHS), p=list(TRUTHS.values()))
+        causes, count = OUTSIDE if truth == "outside" else EFFECTS, {"none": 0, "two": 2}.get(truth, 1)
+        return generator.choice(list(causes), count, replace=False).tolist() if count else []
+    if member.check in ("noise", "background"):
+        return [str(generator.choice(list(EFFECTS)))] if member.number % 2 else []
+    many = member.check == "many"
+    count = int(generator.integers(3, 7)) if many else count_of_causes(generator)
+    names = generator.choice(list(EFFECTS), count, replace=False).tolist()
+    if member.number % 2 if many else has_outside(member.number):
+        names.append(str(generator.choice(list(OUTSIDE))))
+    return names
 
 
 def _with_causes(robot, names, span, generator, conditions):
@@ -116,54 +140,6 @@ def _with_causes(robot, names, span, generator, conditions):
         if true_gap_mm(drawn, conditions) is not None:
             return drawn
     raise UnreachableError(f"{robot.name}: {' and '.join(names)} lose a pose in {DRAWS} draws")
-
-
-def _draw_single(member, robot, generator, conditions):
-    """A robot with a single effect, strong enough to be detected."""
-    acting = draw_acting(robot, member.about, True, (CLEAR, STRONGEST), generator, conditions)
-    return replace(robot, acting=(acting,))
-
-
-def _draw_noisy(member, robot, generator, conditions):
-    """A robot with noise that is not as stated, every second one with one effect."""
-    robot = replace(robot, noise=_changed(NOISES[member.about]))
-    return _add_effect_if_odd(member, robot, generator, conditions)
-
-
-def _add_effect_if_odd(member, robot, generator, conditions):
-    """The robot with one effect where its number is odd."""
-    if member.number % 2 == 0:
-        return robot
-    return _with_causes(robot, [str(generator.choice(list(EFFECTS)))], (SEEN, STRONGEST), generator, conditions)
-
-
-def _draw_many(member, robot, generator, conditions):
-    """A robot with axis errors, scatter and three to six effects; half of them also have a cause from outside."""
-    robot = with_background(robot, generator, conditions)
-    names = generator.choice(list(EFFECTS), int(generator.integers(3, 7)), replace=False).tolist()
-    if member.number % 2:
-        names.append(str(generator.choice(list(OUTSIDE))))
-    noise = {"scatter": float(generator.uniform(0.0, MOST_SCATTER))}
-    return _with_causes(replace(robot, noise=noise), names, MANY, generator, conditions)
-
-
-def _draw_background(member, robot, generator, conditions):
-    """A robot with axis errors, every second one with one effect as well."""
-    robot = with_background(robot, generator, conditions)
-    return _add_effect_if_odd(member, robot, generator, conditions)
-
-
-def _draw_as_robots_are(member, robot, generator, conditions):
-    """A robot with axis errors, scatter, noise that is not as stated and one to six effects.
-
-    Every third one also has a cause from outside the library.
-    """
-    robot = with_background(robot, generator, conditions)
-    robot = replace(robot, noise=noise_not_as_stated(generator))
-    names = generator.choice(list(EFFECTS), count_of_causes(generator), replace=False).tolist()
-    if has_outside(member.number):
-        names.append(str(generator.choice(list(OUTSIDE))))
-    return _with_causes(robot, names, MANY, generator, conditions)
 
 
 def count_of_causes(generator):

@@ -33,16 +33,13 @@ _PLATES = ("plate", "part2", "part3")
 def _rrru3():
     """Base and platform expand alike, which no measurement shows."""
     legs = tuple(zip((1, 2, 3), _PLATES, strict=True))
-    growth = {name: size for k, plate in legs for name, size in _leg_growth(k, plate).items()}
+    growth = {}
+    for k, plate in legs:
+        growth |= {f"crank{k}": (400.0, 0.0, 0.0), f"forearm{k}": (100.0, 0.0, 0.0), plate: (800.0, 0.0, 0.0)}
     arms = tuple(((f"crank{k}.x", f"elbow{k}_x"),) for k, _ in legs)
     forearms = tuple(((f"{plate}.x", f"wrist{k}_x"),) for k, plate in legs)
     tilts = tuple(((f"crank{k}.{turn}", f"elbow{k}_{turn}"),) for k, _ in legs for turn in ("rx", "rz"))
     return Model(140.0, lengths=arms + forearms, tilts=tilts, growth_mm=growth)
-
-
-def _leg_growth(k, plate):
-    """Displacements under thermal expansion of a leg of the 3-RRRU."""
-    return {f"crank{k}": (400.0, 0.0, 0.0), f"forearm{k}": (100.0, 0.0, 0.0), plate: (800.0, 0.0, 0.0)}
 
 
 def _delta():

@@ -11,7 +11,7 @@ import warnings
 from collections import Counter
 from dataclasses import dataclass
 from functools import cache
-from itertools import combinations, pairwise
+from itertools import combinations
 from time import perf_counter
 
 import numpy as np
@@ -81,23 +81,34 @@ def _unit(columns, base):
     return np.where(seen, left / np.where(seen, size, 1.0), 0.0)
 
 
+def _uncalibrated(campaign):
+    """The data (3n,) of a campaign without what the calibration absorbs."""
+    basis, _ = np.linalg.qr(campaign.base)
+    return campaign.data - basis @ (basis.T @ campaign.data)
+
+
+class _Reduced:
+    """A campaign without what the calibration absorbs: gram (k, k), moment (k,) of all columns of unit length with the
+    data, data (3n,), and the numbers of the columns of each term.
+    """
+
+    def __init__(self, campaign):
+        self.data = _uncalibrated(campaign)
+        unit = _unit(np.concatenate(list(campaign.columns.values()), axis=1), campaign.base)
+        self.gram, self.moment = unit.T @ unit, unit.T @ self.data
+        ends = np.cumsum([columns.shape[1] for columns in campaign.columns.values()])
+        self.numbers = np.split(np.arange(ends[-1]), ends[:-1])
+
+
 def bayes_information(campaign):
     """Probability by set of up to two effects: exp(-BIC / 2) of the best choice of their shapes and legs."""
-    terms = list(campaign.columns)
-    ends = np.cumsum([0, *(columns.shape[1] for columns in campaign.columns.values())])
-    numbers = [np.arange(*pair) for pair in pairwise(ends)]
-    together = np.concatenate([*campaign.columns.values(), campaign.data[:, None]], axis=1)
-    basis, _ = np.linalg.qr(campaign.base)
-    data = campaign.data - basis @ (basis.T @ campaign.data)
-    unit = _unit(together[:, :-1], campaign.base)
-    gram, moment = unit.T @ unit, unit.T @ data
-    best = {NONE: 0.0}
+    terms, reduced, best = list(campaign.columns), _Reduced(campaign), {NONE: 0.0}
     pairs = (pair for pair in combinations(range(len(terms)), 2) if terms[pair[0]].effect != terms[pair[1]].effect)
     for chosen in (*((k,) for k in range(len(terms))), *pairs):
-        index = np.concatenate([numbers[k] for k in chosen])
-        gain, rank = _explained(gram[np.ix_(index, index)], moment[index])
+        index = np.concatenate([reduced.numbers[k] for k in chosen])
+        gain, rank = _explained(reduced.gram[np.ix_(index, index)], reduced.moment[index])
         effects = _label(terms[k].effect for k in chosen)
-        best[effects] = max(0.5 * (gain - rank * np.log(len(data))), best.get(effects, -np.inf))
+        best[effects] = max(0.5 * (gain - rank * np.log(len(reduced.data))), best.get(effects, -np.inf))
     weights = np.exp(np.array(list(best.values())) - max(best.values()))
     return dict(zip(best, (weights / weights.sum()).tolist(), strict=True))
 
@@ -137,22 +148,14 @@ def spike_and_slab(campaign, generator):
     Each effect acts with the same probability, in one of its shapes and choices of legs and with one of `_SLABS` for
     all its coefficients, with equal prior probabilities; coefficients are marginalised.
     """
-    terms = list(campaign.columns)
-    numbers = np.split(
-        np.arange(sum(one.shape[1] for one in campaign.columns.values())),
-        np.cumsum([one.shape[1] for one in campaign.columns.values()])[:-1],
-    )
-    basis, _ = np.linalg.qr(campaign.base)
-    unit = _unit(np.concatenate(list(campaign.columns.values()), axis=1), campaign.base)
-    gram, moment = unit.T @ unit, unit.T @ (campaign.data - basis @ (basis.T @ campaign.data))
+    reduced, choices = _Reduced(campaign), {}
 
     @cache
     def marginal(*chosen):
         """Most states of the sampler recur."""
-        return _marginal(gram, moment, numbers, chosen)
+        return _marginal(reduced, chosen)
 
-    choices = {}
-    for number, term in enumerate(terms):
+    for number, term in enumerate(campaign.columns):
         choices.setdefault(term.effect, []).append(number)
     state, found = {}, Counter()
     for sweep in range(_SWEEPS):
@@ -179,17 +182,14 @@ def _drawn(log, generator):
     return int(generator.choice(len(weights), p=weights / weights.sum()))
 
 
-def _marginal(gram, moment, numbers, chosen):
-    """Log marginal likelihood ratio to no term, for chosen pairs (number of a term, slab), coefficients marginalised.
-
-    gram (k, k), moment (k,): of all columns; numbers: of the columns of each term.
-    """
+def _marginal(reduced, chosen):
+    """Log marginal likelihood ratio of chosen pairs (number of a term, slab) to no term, coefficients marginalised."""
     if not chosen:
         return 0.0
-    index = np.concatenate([numbers[number] for number, _ in chosen])
-    scale = np.concatenate([np.full(len(numbers[number]), slab) for number, slab in chosen])
-    factor = np.linalg.cholesky(scale[:, None] * gram[np.ix_(index, index)] * scale + np.eye(len(index)))
-    half = solve_triangular(factor, scale * moment[index], lower=True, check_finite=False)
+    index = np.concatenate([reduced.numbers[number] for number, _ in chosen])
+    scale = np.concatenate([np.full(len(reduced.numbers[number]), slab) for number, slab in chosen])
+    factor = np.linalg.cholesky(scale[:, None] * reduced.gram[np.ix_(index, index)] * scale + np.eye(len(index)))
+    half = solve_triangular(factor, scale * reduced.moment[index], lower=True, check_finite=False)
     return 0.5 * half @ half - np.log(np.diag(factor)).sum()
 
 
@@ -202,8 +202,7 @@ def gaussian_process(campaign):
     from sklearn.gaussian_process.kernels import RBF, ConstantKernel
     from sklearn.model_selection import GroupKFold
 
-    points, (basis, _) = campaign.problem.points, np.linalg.qr(campaign.base)
-    left = (campaign.data - basis @ (basis.T @ campaign.data)).reshape(-1, 3)
+    points, left = campaign.problem.points, _uncalibrated(campaign).reshape(-1, 3)
     seen = np.column_stack([rows.command(points), rows.direction(points), points[list(_NAMED)].to_numpy(dtype=float)])
     seen = seen[:, np.ptp(seen, axis=0) > 0.0]
     seen = (seen - seen.mean(axis=0)) / seen.std(axis=0)
@@ -262,11 +261,6 @@ def _by_probabilities(method, *labels):
     return answer
 
 
-def _by_gaussian_process(measurements, known, settings):
-    """The explained fraction by a Gaussian process, without effects and probabilities."""
-    return "", {}, gaussian_process(_campaign(measurements, known, settings))
-
-
 def _campaign(measurements, known, settings):
     """The Campaign of a measurement table of a MeasuredRobot, by GapSettings."""
     return Campaign.of(measurements, known, settings.library(known.mechanism))
@@ -277,5 +271,5 @@ _METHODS = {
     "bic": _by_probabilities(bayes_information),
     "lasso": _by_probabilities(lasso, "lasso"),
     "spike_and_slab": _by_probabilities(spike_and_slab, "spike_and_slab"),
-    "gaussian_process": _by_gaussian_process,
+    "gaussian_process": lambda *given: ("", {}, gaussian_process(_campaign(*given))),
 }

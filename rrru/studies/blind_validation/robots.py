@@ -65,14 +65,19 @@ _STIFF = {"rad": 4e9, "mm": 2e3}
 
 @dataclass(frozen=True)
 class Conditions:
-    """Conditions of all robots: nominal mechanism, motion as in the configuration, masses, noise per axis, seed."""
+    """Conditions of all robots of one kind: nominal mechanism, motion, masses, noise per axis, seed.
+
+    Of robots of a file also the name of its entry in `robots:`, file, and platform in it.
+    """
 
     mechanism: object
     motion: dict
     masses: Masses
     noise_mm: float
     seed: int
-    model = None
+    name: str = ""
+    file: str = ""
+    platform: str = ""
 
     @classmethod
     def from_config(cls, settings):
@@ -80,40 +85,28 @@ class Conditions:
         mechanism, masses = setup.mechanism(settings["robot"] | {"bounds": _WIDE}), Masses(**settings["masses"])
         return cls(mechanism, settings["motion"], masses, settings["withheld"]["noise_mm"], settings["seed"])
 
+    @classmethod
+    def of_file(cls, parts, settings):
+        """The conditions of one robot of a file from its parts of the configuration and the settings of the check."""
+        nominal, masses = parts["robot"], Masses(**parts["masses"])
+        named = nominal["name"], *(nominal["dimensions"][key] for key in ("mjcf", "platform"))
+        noise_mm, seed = settings["withheld"]["noise_mm"], settings["seed"]
+        return cls(setup.mechanism(nominal), _FILE_MOTION, masses, noise_mm, seed, *named)
+
+    @property
+    def model(self):
+        """Workspace of a robot of a file, and the places in its file where causes act; None of a 3-RRRU."""
+        return MODELS[Path(self.file).stem] if self.file else None
+
     @property
     def noise_rms_mm(self):
         """Rms distance of the noise."""
         return self.noise_mm * np.sqrt(3.0)
 
-    def seen(self, _):
-        """The nominal robot with the parameters that a measurement table observes."""
-        return self.mechanism
-
-
-@dataclass(frozen=True)
-class FileConditions(Conditions):
-    """Conditions of all robots of one file: also name of its entry in `robots:`, file, and platform in it."""
-
-    name: str
-    file: str
-    platform: str
-
-    @property
-    def model(self):
-        """Its workspace, and the places in its file where causes act."""
-        return MODELS[Path(self.file).stem]
-
-    @classmethod
-    def from_parts(cls, parts, settings):
-        """The conditions of one robot from its parts of the configuration and the settings of the check."""
-        nominal, masses = parts["robot"], Masses(**parts["masses"])
-        mjcf, platform = (nominal["dimensions"][key] for key in ("mjcf", "platform"))
-        noise_mm, seed = settings["withheld"]["noise_mm"], settings["seed"]
-        robot = setup.mechanism(nominal)
-        return cls(robot, _FILE_MOTION, masses, noise_mm, seed, nominal["name"], mjcf, platform)
-
     def seen(self, measurements):
         """The nominal robot with the parameters that a measurement table observes."""
+        if self.model is None:
+            return self.mechanism
         return setup.as_measured(self.mechanism, measurements, tuple(self.model.targets))
 
 
@@ -121,7 +114,7 @@ def all_conditions(settings):
     """Conditions by the entry in `robots:` of a file, and with an empty name that of our own 3-RRRU."""
     files = settings["files"].items()
     own = Conditions.from_config(settings)
-    return {"": own} | {name: FileConditions.from_parts(parts, settings) for name, parts in files}
+    return {"": own} | {name: Conditions.of_file(parts, settings) for name, parts in files}
 
 
 # --- robots

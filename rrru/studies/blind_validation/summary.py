@@ -224,6 +224,8 @@ def summary(scores, limits, parts, causes):
     """Frame `withheld_summary` from `withheld_scores`, `withheld_limits`, `withheld_parts` and `withheld_causes`."""
     scores = scores.merge(limits[LIMITS], "left", ["check", "robot"])
     off = (scores["share_closed"] - scores["share_closed_true"]).abs()
+    # robots whose unexplained part is found with a size near the true one
+    sized = parts.loc[(parts["kind"] == "unexplained") & (parts["strength"] > 0.0) & _near(parts), "robot"]
     pairs = zip(scores["truth"], scores["verdict"], strict=True)
     scores = scores.assign(
         acts=scores["truth"].map(_acts),
@@ -231,7 +233,7 @@ def summary(scores, limits, parts, causes):
         nothing_wrong=[set(verdict.split("+")) <= set(truth.split("+")) for truth, verdict in pairs],
         predicted=(off <= _NEAR).astype(float).where(off.notna()),
         noise=scores["robot"].map(noise_of),
-        sized=scores["right"] | scores["robot"].isin(_sized(parts)),
+        sized=scores["right"] | scores["robot"].isin(sized),
     )
     rows = []
     for check, entries in _CHECKS.items():
@@ -255,11 +257,6 @@ def _on_causes(causes, asked):
         _row(lines, _LINES, "not there", "", "invented", asked.get((_LINES, "not there"))),
         _plain("groups named", "mean number of members", len(groups), groups["size"].mean()),
     ]
-
-
-def _sized(parts):
-    """Names of robots whose unexplained part is found with a size near the true one."""
-    return parts.loc[(parts["kind"] == "unexplained") & (parts["strength"] > 0.0) & _near(parts), "robot"]
 
 
 def _near(parts):

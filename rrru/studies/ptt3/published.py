@@ -66,11 +66,10 @@ def _networks(curve, chosen, training, order):
     half_mm = max(curve["radius_mm"], 0.5 * np.ptp(curve["z_mm"]))
     keys = ["experiment", "spread_from", "learns", "spread_mm"]
     curves = pd.merge(chosen[keys], training, on=keys, how="left").sort_values("neurons").groupby(keys)
-    steps = [_steps(part["neurons"].to_numpy(), np.sqrt(part["validation_mse_mm2"].to_numpy())) for _, part in curves]
+    steps = []
+    for _, part in curves:
+        error = np.sqrt(part["validation_mse_mm2"].to_numpy())
+        # the fewest neurons with an error near the minimum
+        steps.append(part["neurons"].to_numpy()[np.argmax(error <= (1.0 + _CONVERGED) * error.min())])
     spreads = {f"spread_{order[row.experiment]}": row.spread_mm / half_mm for row in chosen.itertuples()}
     return spreads | {"training_steps": float(np.median(steps))}
-
-
-def _steps(neurons, error):
-    """Fewest neurons (n,) with an error (n,) near the minimum."""
-    return neurons[np.argmax(error <= (1.0 + _CONVERGED) * error.min())]

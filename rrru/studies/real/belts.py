@@ -170,7 +170,8 @@ def _words(case, verdict, belts):
         effect_model = next(effect_model for effect_model in chosen.effect_models if effect_model.effect == MISSING)
         where.append(effect_model.where)
         notes.append(_missing_words(case, chosen, effect_model, belts))
-        one, any_of_them = (case.probability_of(asked) for asked in (lambda models: effect_model in models, _misses))
+        one = case.probability_of(lambda models: effect_model in models)
+        any_of_them = case.probability_of(lambda models: MISSING in [model.effect for model in models])
         if one < 0.9 * any_of_them:
             notes.append("These rows do not determine whether all belts miss the same length.")
             rivals.append("missing_length of other belts")
@@ -198,11 +199,6 @@ def _words(case, verdict, belts):
         next_runs += "; the same places again with more belt tension: stretch changes, scales do not"
     rivals = ", ".join(dict.fromkeys(rivals))
     return notes, {"where": ", ".join(where), "confounded_with": rivals, "next_runs": next_runs}
-
-
-def _misses(effect_models):
-    """Whether a missing length is among effect models."""
-    return MISSING in [effect_model.effect for effect_model in effect_models]
 
 
 def _missing_words(case, chosen, effect_model, belts):

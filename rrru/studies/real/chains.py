@@ -1,4 +1,4 @@
-"""Robots and sheets of data sets with a file that describes the kinematic chain: elastic torsos with two arms.
+"""Robots of data sets with a file that describes the kinematic chain: elastic torsos with two arms.
 
 A chain's file has DH rows after Craig in m and rad for the trunk and each arm, fixed frames as matrices (4, 4) between
 them, masses, and in `torso_q` the joint values as text: "-(q_torso1 + q_torso2)" for one that follows others. A robot
@@ -8,7 +8,6 @@ is an entry of `robots:` for `rrru.robots.catalogue.make_mechanism`. Lengths in 
 import re
 
 import numpy as np
-import pandas as pd
 from scipy.spatial.transform import Rotation
 
 from rrru.errors import ConfigError
@@ -18,17 +17,13 @@ END_EFFECTORS = ("right", "left")
 _RANGE_DEG = [-180.0, 180.0]
 
 
-def robot_section(chain, follows=True):
-    """The `robots:` entry of a chain's mapping; the columns of its drives are those of the data set's file.
-
-    follows: whether a joint that follows others transmits its load to them, as rods do; otherwise it is a separate
-    drive, whose values `sheet` adds.
-    """
+def robot_section(chain):
+    """The `robots:` entry of a chain's mapping; the columns of its drives are those of the data set's file."""
     masses = chain["masses"]
     trunk = [_frame(chain["base_to_torso"])]
     for number, (row, mass) in enumerate(zip(chain["torso"], masses["torso"], strict=True)):
         name, drives = _joint(chain, number)
-        joint = {"name": name, "drives": drives} if drives and follows else {"name": name, "range_deg": _RANGE_DEG}
+        joint = {"name": name, "drives": drives} if drives else {"name": name, "range_deg": _RANGE_DEG}
         trunk.append(joint | _row(row, mass))
     head = _head_centre(chain)
     trunk.append({"xyz_mm": [0.0, 0.0, 0.0], "mass_kg": masses["head"]["mass_kg"], "com_mm": head.tolist()})
@@ -41,22 +36,6 @@ def robot_section(chain, follows=True):
         last = _frame(chain["wrist_to_hand"]) | _mass(masses["hand"])
         end_effectors[hand] = [_frame(chain[f"torso_to_{hand}"]), *rows, last]
     return {"dh": trunk, "hands": end_effectors, "convention": "modified"}
-
-
-def sheet(chain, frame):
-    """One row per end effector and pose of a data set's table (n), with the columns of ingest, positions in m."""
-    joints = [_joint(chain, number) for number in range(len(chain["torso"]))]
-    joints += [(f"q_{hand}{k}", {}) for hand in END_EFFECTORS for k in range(len(chain[hand]))]
-    followed = {
-        name: sum(by * frame[f"{drive}_rad"] for drive, by in factors.items()) for name, factors in joints if factors
-    }
-    frame = frame.assign(**{f"{name}_rad": values for name, values in followed.items()})
-    drives, parts = [f"{name}_rad" for name, _ in joints], []
-    for hand in END_EFFECTORS:
-        poses = frame[["row", "held_out", *drives]].assign(trajectory="poses", target=hand)
-        read = {f"measured_{axis}_mm": frame[f"{hand}_{axis}_m"] for axis in "xyz"}
-        parts.append(poses.assign(**read))
-    return pd.concat(parts).sort_values("row", kind="stable").reset_index(drop=True)
 
 
 def _frame(matrix):

@@ -8,7 +8,7 @@ import yaml
 from rrru.campaign.plan import make_plan
 from rrru.campaign.trajectories import from_config
 from rrru.studies.blind_validation.chunks import Member, described
-from rrru.studies.blind_validation.robots import FileConditions, FileRobot
+from rrru.studies.blind_validation.robots import Conditions, FileRobot
 from tests.places import ROOT
 
 FILES = ("rrru3_file", "delta_file", "hexapod_file", "arm6_file")
@@ -17,9 +17,9 @@ _PLAIN = {"reverse": False, "payload_kg": 0.0}
 
 @cache
 def conditions(file):
-    """FileConditions of an entry of the configuration."""
+    """Conditions of an entry of the configuration."""
     config = yaml.safe_load((ROOT / "config.yaml").read_text())
-    return FileConditions.from_parts(described(config, [Member("own", file, 0)])[file], config)
+    return Conditions.of_file(described(config, [Member("own", file, 0)])[file], config)
 
 
 class Short(FileRobot):

@@ -12,7 +12,6 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from rrru.campaign import measurements as rows
 from rrru.campaign.ingest.campaign_file import IngestSpec, ingest
 from rrru.diagnosis.calibrate import calibrate
 from rrru.diagnosis.diagnose import MeasuredRobot, diagnose
@@ -23,7 +22,7 @@ from rrru.effects.library import NAMES, find
 from rrru.errors import ConfigError
 from rrru.kinematics.dynamics import Masses
 from rrru.pipeline import setup
-from rrru.studies.real.chains import robot_section, sheet
+from rrru.studies.real.chains import END_EFFECTORS, robot_section
 
 _FOLDER = Path(os.environ.get("RRRU_REAL_DATA", ""), "justin")
 _THERE = "RRRU_REAL_DATA" in os.environ and (_FOLDER / "chain.json").is_file()
@@ -63,14 +62,46 @@ class Torso:
         return fit, np.linalg.norm(test.left(fit.state), axis=1)
 
 
+def _sheet(section, frame):
+    """One row per end effector and pose of the data set's table, with the columns of ingest, positions in m."""
+    trunk = [row for row in section["dh"] if "name" in row]
+    for row in trunk:
+        if "drives" in row:
+            values = sum(by * frame[f"{drive}_rad"] for drive, by in row["drives"].items())
+            frame = frame.assign(**{f"{row['name']}_rad": values})
+    arms = [row for hand in END_EFFECTORS for row in section["hands"][hand] if "name" in row]
+    drives, parts = [f"{row['name']}_rad" for row in (*trunk, *arms)], []
+    for hand in END_EFFECTORS:
+        poses = frame[["row", "held_out", *drives]].assign(trajectory="poses", target=hand)
+        read = {f"measured_{axis}_mm": frame[f"{hand}_{axis}_m"] for axis in "xyz"}
+        parts.append(poses.assign(**read))
+    return pd.concat(parts).sort_values("row", kind="stable").reset_index(drop=True)
+
+
+def _free(section):
+    """The robot with drives instead of the joints that follow others."""
+    trunk = [
+        {"range_deg": [-180.0, 180.0]} | {key: value for key, value in row.items() if key != "drives"}
+        if "drives" in row
+        else row
+        for row in section["dh"]
+    ]
+    return section | {"dh": trunk}
+
+
 def _read(folder, follows):
     """The Torso, through a sheet and ingest."""
-    chain = json.loads((_FOLDER / "chain.json").read_text())
-    frame = sheet(chain, pd.read_csv(_FOLDER / "measurements.csv"))
+    section = robot_section(json.loads((_FOLDER / "chain.json").read_text()))
+    frame = _sheet(section, pd.read_csv(_FOLDER / "measurements.csv"))
     file = folder / "torso.csv"
     frame.to_csv(file, index=False)
     bounds = {"angle_rad": 0.3, "length_mm": 100.0}
-    nominal = {"name": "torso", "dimensions": robot_section(chain, follows), "registered": True, "bounds": bounds}
+    nominal = {
+        "name": "torso",
+        "dimensions": section if follows else _free(section),
+        "registered": True,
+        "bounds": bounds,
+    }
     spec = IngestSpec(str(file), unit="m", frame="register", extra_columns="ignore")
     table = ingest(spec, setup.mechanism(nominal)).measurements
     return Torso(nominal, table.assign(held_out=frame["held_out"].to_numpy()))
@@ -203,18 +234,6 @@ def test_a_chain_becomes_rows_in_mm_and_degrees():
     # the head's z is the torso's -y, and its y the torso's z
     np.testing.assert_allclose(head["com_mm"], [200.0, -100.0, 150.0], atol=1e-9)
     assert section["hands"]["left"][1]["alpha_deg"] == pytest.approx(-np.degrees(1.0))
-    free = robot_section(_CHAIN, follows=False)["dh"][3]
-    assert "drives" not in free and free["range_deg"] == [-180.0, 180.0]
-
-
-def test_a_sheet_has_a_row_for_each_hand_and_the_value_of_what_follows():
-    joints = ("q_torso0", "q_torso1", "q_right0", "q_right1", "q_left0", "q_left1")
-    frame = pd.DataFrame({f"{name}_rad": [0.1 * k, 0.2] for k, name in enumerate(joints)})
-    places = {f"{hand}_{axis}_m": [1.0, 2.0] for hand in ("right", "left") for axis in "xyz"}
-    found = sheet(_CHAIN, frame.assign(row=[0, 7], held_out=[1, 0], **places))
-    assert found["target"].tolist() == ["right", "left"] * 2 and found["held_out"].tolist() == [1, 1, 0, 0]
-    np.testing.assert_allclose(found["q_follows2_rad"], [-0.1, -0.1, -0.4, -0.4])
-    np.testing.assert_allclose(rows.measured(found), np.repeat([[1.0] * 3, [2.0] * 3], 2, axis=0))
 
 
 def test_words_that_are_no_value_of_a_joint_are_refused():

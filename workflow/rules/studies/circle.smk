@@ -19,14 +19,14 @@ if CIRCLE:
         log:
             f"{RESULTS}/logs/circle.log",
         params:
+            **job("circle"),
             settings={
                 "nominal": parts.nominal(config, _DIAGNOSED),
                 "masses": parts.masses(config, config["campaigns"][_DIAGNOSED]),
                 **reads("circle"),
             },
-            code=code("circle"),
         script:
-            "../../scripts/circle.py"
+            "../../scripts/job.py"
 
     rule circle:
         input:

@@ -38,10 +38,10 @@ rule delta_images:
     log:
         f"{RESULTS}/logs/delta_images.log",
     params:
+        **job("delta_images"),
         settings=reads(*_SCENE),
-        code=code("delta_images"),
     script:
-        "../../scripts/delta_images.py"
+        "../../scripts/job.py"
 
 
 # it reads the images and the commands, never the truth
@@ -55,10 +55,10 @@ rule delta_vision:
     log:
         f"{RESULTS}/logs/delta_vision.log",
     params:
+        **job("delta_vision"),
         settings=reads(*_ROBOT, "delta.target.diameter_mm", "delta.target.pitch_mm"),
-        code=code("delta_vision"),
     script:
-        "../../scripts/delta_vision.py"
+        "../../scripts/job.py"
 
 
 rule delta_calibrate:
@@ -71,25 +71,10 @@ rule delta_calibrate:
     log:
         f"{RESULTS}/logs/delta_calibrate.log",
     params:
+        **job("delta_calibrate"),
         settings=reads(*_SCENE, "delta.spread", "delta.length_error_mm"),
-        code=code("delta_calibrate"),
     script:
-        "../../scripts/delta_calibrate.py"
-
-
-rule delta_twin:
-    input:
-        delta_dots=table("delta_dots"),
-        delta_truth=under("delta")("truth"),
-    output:
-        twin=f"{RESULTS}/twin/delta.yaml",
-    log:
-        f"{RESULTS}/logs/delta_twin.log",
-    params:
-        settings=reads(*_SCENE, "delta.search"),
-        code=code("delta_twin"),
-    script:
-        "../../scripts/delta_twin.py"
+        "../../scripts/job.py"
 
 
 rule delta:

@@ -1,11 +1,10 @@
 """Figures of paper B's robot: its singularities, its backlash and its repeatability."""
 
-import numpy as np
-from matplotlib.colors import BoundaryNorm
 from matplotlib.lines import Line2D
 
 from rrru.figures import style
 from rrru.figures.choose import where
+from rrru.figures.workspace import draw_measure
 
 _LEVELS = (0.0, 0.05, 0.1, 0.2, 0.3, 0.4, 0.6, 0.8, 1.0)
 _SLICES = {"xz": ("x", "z", "y"), "xy": ("x", "y", "z")}
@@ -28,7 +27,9 @@ def ptt_singularity(tables, options):
         place = f"{part[f'{normal}_mm'].iloc[0]:g}".replace("-", "\N{MINUS SIGN}")
         fields = part.pivot(index=f"{up}_mm", columns=f"{across}_mm")
         for axes, measure in zip(panels[row], ("translational_measure", "constraint_measure"), strict=True):
-            image = _map(axes, fields[measure], fields["kappa_mm2"] if measure == "translational_measure" else None)
+            line = fields["kappa_mm2"] if measure == "translational_measure" else None
+            places = [axis.to_numpy() for axis in (fields[measure].columns, fields[measure].index)]
+            image = draw_measure(axes, places, fields[measure].to_numpy(dtype=float), line, _LEVELS)
             for colour, width in (("white", 2.0), ("black", 0.9)):
                 axes.plot(curve[f"command_{across}_mm"], curve[f"command_{up}_mm"], color=colour, linewidth=width)
             axes.set(xlabel=f"{across} (mm)", aspect="equal")
@@ -44,27 +45,6 @@ def ptt_singularity(tables, options):
     ]
     figure.legend(handles=handles, loc="outside upper center", ncols=2)
     return figure
-
-
-def _map(axes, field, kappa):
-    """One measure over a slice, hatched out of reach, with the zero line of kappa where it is given."""
-    across, up = field.columns.to_numpy(), field.index.to_numpy()
-    half = 0.5 * (across[1] - across[0])
-    axes.patch.set(facecolor="white", edgecolor="#cccccc", hatch="////", linewidth=0.0)
-    image = axes.imshow(
-        np.ma.masked_invalid(field.to_numpy(dtype=float)),
-        extent=(across[0] - half, across[-1] + half, up[0] - half, up[-1] + half),
-        origin="lower",
-        cmap=style.MEASURE,
-        norm=BoundaryNorm(_LEVELS, 256),
-        interpolation="none",
-    )
-    if kappa is not None:
-        values = np.ma.masked_invalid(kappa.to_numpy(dtype=float))
-        if values.count() and values.min() < 0.0 < values.max():
-            for colour, width in (("white", 2.2), (style.VERMILION, 1.2)):
-                axes.contour(across, up, values, levels=[0.0], colors=[colour], linewidths=width)
-    return image
 
 
 @style.printed

@@ -147,7 +147,9 @@ def _error_panels(paths, cells, curves, tags, marks):
         for row, (tag, (_, look, _), (low, high)) in enumerate(zip(tags, curves, ranges, strict=True)):
             text = f"{choose.trajectory_label(tag)} {style.number(low)} to {style.number(high)} mm"
             place = {"transform": axes.transAxes, "ha": "right", "va": "top", "in_layout": False}
-            axes.text(0.97, 0.97 - 0.11 * row, text, fontsize=7.0, color=_dark(look["color"]), **place)
+            # orange is too light for text
+            color = "#8a5f00" if look["color"] == style.ORANGE else look["color"]
+            axes.text(0.97, 0.97 - 0.11 * row, text, fontsize=7.0, color=color, **place)
     # space for the numbers above the highest curve
     top = max((axes.dataLim.y1 for axes in cells.values() if np.isfinite(axes.dataLim.y1)), default=1.0)
     next(iter(cells.values())).set_ylim(0.0, 1.45 * top)
@@ -164,11 +166,6 @@ def _outer_labels(grid, cells):
         lowest = [axes for axes in column if axes in used]
         if lowest:
             lowest[-1].set_xlabel("point")
-
-
-def _dark(color):
-    """The colour of a number: orange is too light for text."""
-    return "#8a5f00" if color == style.ORANGE else color
 
 
 def _path(axes, places, curves):
