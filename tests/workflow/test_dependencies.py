@@ -36,8 +36,7 @@ def test_every_module_that_a_job_has_loaded_is_in_its_digest(records):
 def covered_by_its_digest(rule, jobs):
     """Whether the digest of a rule covers all that its recorded jobs have loaded."""
     for row in jobs:
-        scripts = (f"workflow/scripts/{name}.py" for name in ("job", row["script"]))
-        covered = {str(file) for file in digest.closure(*scripts)}
+        covered = {str(file) for file in digest.closure(f"workflow/scripts/{row['script']}")}
         loaded = {importlib.import_module(name).__file__ for name in row["modules"]}
         # a script that draws loads the functions that its settings name
         drawn = {str(file) for name in row["modules"] if "figures" in name for file in digest.closure(name)}

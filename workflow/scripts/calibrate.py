@@ -1,5 +1,7 @@
 """Calibrations of one campaign on every set of trajectories."""
 
 from rrru.pipeline.jobs.calibrate import main
+from rrru.store.job import run
 
-__all__ = ["main"]
+if __name__ == "__main__":
+    run(main, snakemake)

@@ -1,5 +1,7 @@
 """One campaign, driven by a virtual robot or read from a file."""
 
 from rrru.pipeline.jobs.read import main
+from rrru.store.job import run
 
-__all__ = ["main"]
+if __name__ == "__main__":
+    run(main, snakemake)

@@ -4,6 +4,7 @@ from rrru.calibration.campaign_fit import deviation_vector
 from rrru.kinematics.dynamics import Masses
 from rrru.pipeline import setup
 from rrru.store import tables
+from rrru.store.job import run
 from rrru.studies.end_to_end.models import errors, sizes
 from rrru.studies.end_to_end.schemas import TABLES
 
@@ -19,3 +20,7 @@ def main(settings, inputs, outputs):
     whole = sizes(points, verdict["effects"], info["noise_mm"])
     frames = {"circle_points": points, "circle": whole.assign(diagnosed=section["diagnosed"], fresh=section["fresh"])}
     tables.write_all(TABLES, frames, outputs)
+
+
+if __name__ == "__main__":
+    run(main, snakemake)

@@ -1,6 +1,7 @@
 """Every variant of the Delta's zero calibration, applied and measured again."""
 
 from rrru.store import tables
+from rrru.store.job import run
 from rrru.studies.delta import draws, fits, views
 from rrru.studies.delta.centres import pose_errors
 from rrru.studies.delta.schemas import TABLES
@@ -25,3 +26,7 @@ def main(settings, inputs, outputs):
         "delta_poses": pose_errors(centres, truth),
     }
     tables.write_all(TABLES, frames, outputs)
+
+
+if __name__ == "__main__":
+    run(main, snakemake)

@@ -4,6 +4,7 @@ import numpy as np
 
 from rrru.store import tables
 from rrru.store.atomic_write import whole
+from rrru.store.job import run
 from rrru.studies.delta import views
 from rrru.studies.delta.schemas import TABLES
 from rrru.studies.delta.virtual_delta import twin
@@ -18,3 +19,7 @@ def main(settings, inputs, outputs):
     with whole(outputs["images"]) as (partial,), partial.open("wb") as file:
         np.savez(file, tilted=tilted, poses=poses)
     tables.write_all(TABLES, {"delta_truth": truth}, outputs)
+
+
+if __name__ == "__main__":
+    run(main, snakemake)

@@ -7,6 +7,7 @@ import pandas as pd
 
 from rrru.campaign.measurements import vectors
 from rrru.store import tables
+from rrru.store.job import run
 from rrru.studies.delta import centres
 from rrru.studies.delta.schemas import TABLES
 from rrru.studies.delta.variants import PAPER
@@ -40,3 +41,7 @@ def main(settings, inputs, outputs):
         "delta_timings": pd.DataFrame({**steps, "seconds": np.diff(started)}),
     }
     tables.write_all(TABLES, frames, outputs)
+
+
+if __name__ == "__main__":
+    run(main, snakemake)

@@ -1,5 +1,7 @@
 """Diagnosis of one campaign, with its figures."""
 
 from rrru.pipeline.jobs.diagnose import main
+from rrru.store.job import run
 
-__all__ = ["main"]
+if __name__ == "__main__":
+    run(main, snakemake)

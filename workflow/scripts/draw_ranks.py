@@ -2,6 +2,7 @@
 
 from rrru.pipeline import setup
 from rrru.store import tables
+from rrru.store.job import run
 from rrru.studies.rrru3 import redraw
 from rrru.studies.rrru3.schemas import TABLES
 
@@ -13,3 +14,7 @@ def main(settings, inputs, outputs):
     campaign = setup.virtual_campaign(settings["nominal"], settings["virtual"])
     drawn = redraw.draws(campaign, patterns, reproduce["method"], range(reproduce["ranked"]), near)
     tables.write_all(TABLES, {"draw_ranks": redraw.draw_ranks(drawn)}, outputs)
+
+
+if __name__ == "__main__":
+    run(main, snakemake)

@@ -3,6 +3,7 @@
 from rrru.campaign.measurements import vectors
 from rrru.genetic.settings import GeneticSettings
 from rrru.store import tables
+from rrru.store.job import run
 from rrru.studies.methods.compare import compare, measuring_time_s
 from rrru.studies.methods.learners import Candidates
 from rrru.studies.methods.regions import trial
@@ -28,3 +29,7 @@ def _from_images(one, calibrations, poses):
         "poses": int(found["poses"]),
         "measuring_time_s": measuring_time_s(one, vectors(poses[poses["plane"] == "first"], "command")),
     }
+
+
+if __name__ == "__main__":
+    run(main, snakemake)

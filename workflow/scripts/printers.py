@@ -1,7 +1,7 @@
 """Linear-delta printers calibrated from their owners' measurements, and compared with their firmware's answers."""
 
 from rrru.store import tables
-from rrru.store.job import tell
+from rrru.store.job import run, tell
 from rrru.studies.printers import printer_tables
 from rrru.studies.printers.files import read_all
 from rrru.studies.printers.schemas import TABLES
@@ -16,3 +16,7 @@ def main(settings, inputs, outputs):
     for row in frames["printers"].itertuples():
         if row.reason:
             tell(f"{row.printer}: {row.verdict}: {row.reason}")
+
+
+if __name__ == "__main__":
+    run(main, snakemake)

@@ -3,6 +3,7 @@
 import pandas as pd
 
 from rrru.store import tables
+from rrru.store.job import run
 from rrru.studies.ptt3 import driving, results
 from rrru.studies.ptt3.bench import widths_mm
 from rrru.studies.ptt3.experiments import experiment, point_means
@@ -35,3 +36,7 @@ def _frames(section, one, measurements):
         "ptt_corrections": results.corrections(learned),
         "ptt_extrapolation": driving.extrapolations(one, learned, section["extrapolation"]),
     }
+
+
+if __name__ == "__main__":
+    run(main, snakemake)

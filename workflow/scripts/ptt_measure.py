@@ -3,6 +3,7 @@
 from rrru.campaign.schemas import measurement_table
 from rrru.robots.ptt3 import Ptt3
 from rrru.store import tables
+from rrru.store.job import run
 from rrru.studies.ptt3 import bench
 from rrru.studies.ptt3.experiments import experiment, joined
 from rrru.studies.ptt3.schemas import TABLES
@@ -32,3 +33,7 @@ def _measured(settings, backlash):
     for name, members in section["joint"].items():
         measured[name] = joined([measured[member] for member in members], section["motion"]["dwell_s"])
     return measured
+
+
+if __name__ == "__main__":
+    run(main, snakemake)

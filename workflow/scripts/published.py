@@ -5,6 +5,7 @@ import importlib
 import pandas as pd
 
 from rrru.store import tables
+from rrru.store.job import run
 from rrru.studies.schemas import TABLES
 
 
@@ -18,3 +19,7 @@ def main(settings, inputs, outputs):
         audit.append(findings.audit_rows())
     frames = {"published": pd.concat(published, ignore_index=True), "audit": pd.concat(audit, ignore_index=True)}
     tables.write_all(TABLES, frames, outputs)
+
+
+if __name__ == "__main__":
+    run(main, snakemake)

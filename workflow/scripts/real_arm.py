@@ -8,7 +8,7 @@ import pandas as pd
 from rrru.diagnosis.settings import GapSettings
 from rrru.figures.drawing import draw_all
 from rrru.store import tables
-from rrru.store.job import tell
+from rrru.store.job import run, tell
 from rrru.studies.real.carry import carried, model
 from rrru.studies.real.schemas import TABLES
 from rrru.studies.real.series import found, missing
@@ -40,3 +40,7 @@ def _carried(series, settings, inputs):
     chosen = GapSettings.from_config(settings["gap"] | settings["real"]["gap"], settings["seed"])
     robots = settings["robots"]
     return carried([model(one, numbers, pd.read_parquet(seen), robots, chosen) for one, numbers, seen in known])
+
+
+if __name__ == "__main__":
+    run(main, snakemake)

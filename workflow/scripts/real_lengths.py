@@ -5,7 +5,7 @@ import pandas as pd
 from rrru.errors import RrruError
 from rrru.figures.drawing import draw_all
 from rrru.store import tables
-from rrru.store.job import tell
+from rrru.store.job import run, tell
 from rrru.studies.real import belts, cables
 from rrru.studies.real.schemas import TABLES
 from rrru.studies.real.series import found, missing, named, refused
@@ -41,3 +41,7 @@ def _tables(series, study):
         frames["real_steps"] = frames["real_steps"].assign(number=numbers)
         frames["real_parameters"] = frames["real_parameters"].assign(effect="calibration")
     return {name: frame.assign(campaign=series.name) for name, frame in frames.items()}
+
+
+if __name__ == "__main__":
+    run(main, snakemake)

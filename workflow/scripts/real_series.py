@@ -9,7 +9,7 @@ from rrru.diagnosis.settings import GapSettings
 from rrru.errors import RrruError
 from rrru.store import tables
 from rrru.store.atomic_write import whole
-from rrru.store.job import tell
+from rrru.store.job import run, tell
 from rrru.studies.real import arm_tables, arms
 from rrru.studies.real.carry import saved_values
 from rrru.studies.real.schemas import SERIES_TABLES
@@ -34,3 +34,7 @@ def main(settings, inputs, outputs):
     with whole(outputs["measurements"], outputs["model"]) as (table, text):
         measurements.to_parquet(table, index=False)
         text.write_text(json.dumps(model))
+
+
+if __name__ == "__main__":
+    run(main, snakemake)

@@ -4,6 +4,7 @@ import pandas as pd
 
 from rrru.pipeline import setup
 from rrru.store import tables
+from rrru.store.job import run
 from rrru.studies.rrru3 import redraw, twin
 from rrru.studies.rrru3.schemas import TABLES
 
@@ -25,3 +26,7 @@ def main(settings, inputs, outputs):
         "twin_numbers": twin.numbers(virtual or {"trajectories": {}}),
     }
     tables.write_all(TABLES, frames, outputs)
+
+
+if __name__ == "__main__":
+    run(main, snakemake)

@@ -10,6 +10,7 @@ from rrru.genetic.settings import GeneticSettings
 from rrru.genetic.sweep import run_sweep
 from rrru.pipeline import setup
 from rrru.store import tables
+from rrru.store.job import run
 
 
 def main(settings, inputs, outputs):
@@ -36,3 +37,7 @@ def main(settings, inputs, outputs):
     ]
     frames = {name: pd.concat([part[name] for part in swept], ignore_index=True) for name in swept[0]}
     tables.write_all(TABLES, frames, outputs)
+
+
+if __name__ == "__main__":
+    run(main, snakemake)

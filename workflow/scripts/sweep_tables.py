@@ -5,6 +5,7 @@ import pandas as pd
 from rrru.genetic.schemas import TABLES
 from rrru.genetic.sweep import setting_effect, setting_pairs
 from rrru.store import tables
+from rrru.store.job import run
 from rrru.studies.rrru3.schemas import TABLES as OWN_TABLES
 from rrru.studies.rrru3.sweep_match import sweep_match
 
@@ -19,3 +20,7 @@ def main(settings, inputs, outputs):
     frames |= {"sweep_effect": setting_effect(runs), "sweep_pairs": setting_pairs(runs, settings["seed"])}
     frames["sweep_match"] = sweep_match(runs, settings["seed"])
     tables.write_all((*TABLES, *OWN_TABLES), frames, outputs)
+
+
+if __name__ == "__main__":
+    run(main, snakemake)

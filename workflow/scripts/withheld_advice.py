@@ -7,6 +7,7 @@ from rrru.diagnosis.settings import GapSettings
 from rrru.kinematics.dynamics import Masses
 from rrru.pipeline import setup
 from rrru.store import tables
+from rrru.store.job import run
 from rrru.studies.blind_validation.advice import UNSURE, advice_summary, ambiguous, follow
 from rrru.studies.blind_validation.robots import Conditions, robot_of
 from rrru.studies.blind_validation.schemas import TABLES
@@ -32,3 +33,7 @@ def main(settings, inputs, outputs):
     followed = pd.DataFrame(result, columns=columns)
     frames = {"withheld_advice": followed, "withheld_advice_summary": advice_summary(followed)}
     tables.write_all(TABLES, frames, outputs)
+
+
+if __name__ == "__main__":
+    run(main, snakemake)

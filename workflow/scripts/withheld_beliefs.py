@@ -7,6 +7,7 @@ from rrru.diagnosis.settings import GapSettings
 from rrru.kinematics.dynamics import Masses
 from rrru.pipeline import setup
 from rrru.store import tables
+from rrru.store.job import run
 from rrru.studies.blind_validation.rivals import beliefs
 from rrru.studies.blind_validation.schemas import TABLES
 
@@ -21,3 +22,7 @@ def main(settings, inputs, outputs):
         points = measured.get_group(name).drop(columns="robot").reset_index(drop=True)
         said.append(beliefs(points, MeasuredRobot(robot, masses, settings["withheld"]["noise_mm"], name), gap))
     tables.write_all(TABLES, {"withheld_beliefs": pd.concat(said, ignore_index=True)}, outputs)
+
+
+if __name__ == "__main__":
+    run(main, snakemake)

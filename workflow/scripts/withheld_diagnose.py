@@ -8,6 +8,7 @@ from rrru.diagnosis.settings import GapSettings
 from rrru.kinematics.dynamics import Masses
 from rrru.pipeline import setup
 from rrru.store import tables
+from rrru.store.job import run
 from rrru.studies.blind_validation.schemas import TABLES
 from rrru.studies.blind_validation.stated import VERDICT, fitted, state_row, stated
 
@@ -39,3 +40,7 @@ def main(settings, inputs, outputs):
         "withheld_budget": pd.concat(budgets, ignore_index=True),
     }
     tables.write_all(TABLES, frames, outputs)
+
+
+if __name__ == "__main__":
+    run(main, snakemake)

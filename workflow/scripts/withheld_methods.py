@@ -3,6 +3,7 @@
 import pandas as pd
 
 from rrru.store import tables
+from rrru.store.job import run
 from rrru.studies.blind_validation.schemas import TABLES
 from rrru.studies.blind_validation.summary import compare_methods
 
@@ -14,3 +15,7 @@ def main(settings, inputs, outputs):
         for name in ("withheld_beliefs", "withheld_answers")
     )
     tables.write_all(TABLES, {"withheld_methods": compare_methods(said, answers)}, outputs)
+
+
+if __name__ == "__main__":
+    run(main, snakemake)

@@ -3,6 +3,7 @@
 import pandas as pd
 
 from rrru.store import tables
+from rrru.store.job import run
 from rrru.studies.blind_validation.chunks import Member
 from rrru.studies.blind_validation.draw import drawn
 from rrru.studies.blind_validation.robots import all_conditions
@@ -23,3 +24,7 @@ def main(settings, inputs, outputs):
     names = frames["withheld_measurements"].columns
     # the drives are those of all robots of the chunk
     tables.write_all(tables_of(conditions[member.file].mechanism, names), frames, outputs)
+
+
+if __name__ == "__main__":
+    run(main, snakemake)

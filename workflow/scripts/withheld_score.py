@@ -2,6 +2,7 @@
 
 from rrru.diagnosis.settings import GapSettings
 from rrru.store import tables
+from rrru.store.job import run
 from rrru.studies.blind_validation.robots import all_conditions
 from rrru.studies.blind_validation.schemas import TABLES
 from rrru.studies.blind_validation.score import Known, score_chunk
@@ -14,3 +15,7 @@ def main(settings, inputs, outputs):
     known = {name: Known(one, gap.library(one.mechanism)) for name, one in all_conditions(settings).items()}
     scored = score_chunk(**frames, known=known)
     tables.write_all(TABLES, {f"withheld_{name}": frame for name, frame in scored._asdict().items()}, outputs)
+
+
+if __name__ == "__main__":
+    run(main, snakemake)

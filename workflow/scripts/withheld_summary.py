@@ -1,6 +1,7 @@
 """All verdicts and scores of the check on withheld effects, its figures and its confusion table."""
 
 from rrru.store import tables
+from rrru.store.job import run
 from rrru.studies.blind_validation.schemas import TABLES
 from rrru.studies.blind_validation.summary import (
     CAUSES,
@@ -42,3 +43,7 @@ def _of_field(inputs):
         return {"withheld_verdicts": field}
     scores = score_field(field, read_field_answers(inputs["field_answers"]))
     return {"withheld_verdicts": field, "withheld_scores": scores}
+
+
+if __name__ == "__main__":
+    run(main, snakemake)

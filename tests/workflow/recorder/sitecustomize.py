@@ -82,7 +82,7 @@ def run(main, snakemake):
     _plain_run(recorded, snakemake)
     loaded = sorted(name for name in sys.modules if name.split(".")[0] == "rrru")
     # snakemake runs a copy, and states the script's own path
-    script = snakemake.params.get("job") or Path(sys.modules["__main__"].__file__).stem
+    script = Path(sys.modules["__main__"].__file__).name
     row = {"rule": snakemake.rule, "script": script, "modules": loaded, "code": snakemake.params.code}
     row |= {"handed": sorted(leaves(snakemake.params.settings), key=str), "read": sorted(seen, key=str)}
     row |= {"threads": [(pool["internal_api"], pool["num_threads"]) for pool in threadpool_info()]}

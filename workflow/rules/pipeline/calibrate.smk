@@ -12,10 +12,10 @@ rule calibrate:
     log:
         f"{RESULTS}/logs/calibrate/{{campaign}}.log",
     params:
-        **job("calibrate"),
         settings=calibrated(*parts.CALIBRATION_KEYS),
+        code=code("calibrate"),
     script:
-        "../../scripts/job.py"
+        "../../scripts/calibrate.py"
 
 
 rule genetic:
@@ -27,10 +27,10 @@ rule genetic:
     log:
         f"{RESULTS}/logs/genetic/{{campaign}}.log",
     params:
-        **job("genetic"),
         settings=calibrated(*parts.GENETIC_KEYS),
+        code=code("genetic"),
     script:
-        "../../scripts/job.py"
+        "../../scripts/genetic.py"
 
 
 # every calibration applied to every trajectory
@@ -42,10 +42,10 @@ rule compensate:
     log:
         f"{RESULTS}/logs/compensate/{{campaign}}.log",
     params:
-        **job("compensate"),
         settings=calibrated(driven=True),
+        code=code("compensate"),
     script:
-        "../../scripts/job.py"
+        "../../scripts/compensate.py"
 
 
 rule gather:
@@ -56,7 +56,7 @@ rule gather:
     log:
         f"{RESULTS}/logs/gather.log",
     params:
-        **job("gather"),
         settings={},
+        code=code("gather"),
     script:
-        "../../scripts/job.py"
+        "../../scripts/gather.py"

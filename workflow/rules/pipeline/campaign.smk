@@ -13,7 +13,7 @@ rule campaign:
     wildcard_constraints:
         campaign="|".join(CAMPAIGNS),
     params:
-        **job("campaign"),
         settings=campaign_settings,
+        code=code("campaign"),
     script:
-        "../../scripts/job.py"
+        "../../scripts/campaign.py"

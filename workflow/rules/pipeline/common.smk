@@ -77,12 +77,7 @@ def shown(figures):
 def code(script, *figures):
     """Digest of a script and of all that it imports, the functions of figures {name: (function, tables)} included."""
     modules = sorted({function.partition(":")[0] for group in figures for function, _ in group.values()})
-    return code_digest(f"workflow/scripts/{script}.py", "workflow/scripts/job.py", *modules)
-
-
-def job(script, *figures):
-    """Parameters of a rule whose job is `main` of a script: its name, and the digest of its code."""
-    return {"job": script, "code": code(script, *figures)}
+    return code_digest(f"workflow/scripts/{script}.py", *modules)
 
 
 def reads(*keys):

@@ -11,7 +11,7 @@ for study, figures in FIGURES.items():
         log:
             f"{RESULTS}/logs/figures/{study}.log",
         params:
-            **job("figure", figures),
             settings={"figures": figures, "options": {}},
+            code=code("figure", figures),
         script:
-            "../../scripts/job.py"
+            "../../scripts/figure.py"

@@ -15,11 +15,11 @@ rule diagnose:
     wildcard_constraints:
         campaign=diagnosed_as(""),
     params:
-        **job("diagnose", GAP_FIGURES),
         settings=diagnosed,
         own_effects=own_effects_digests(),
+        code=code("diagnose", GAP_FIGURES),
     script:
-        "../../scripts/job.py"
+        "../../scripts/diagnose.py"
 
 
 # the corrected file of a robot that was given as a file

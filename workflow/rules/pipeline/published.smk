@@ -10,10 +10,10 @@ rule published:
     log:
         f"{RESULTS}/logs/published.log",
     params:
-        **job("published", {module: (module, []) for module in PAPER_MODULES}),
         settings=dict(sorted(PAPERS.items())),
+        code=code("published", {module: (module, []) for module in PAPER_MODULES}),
     script:
-        "../../scripts/job.py"
+        "../../scripts/published.py"
 
 
 TARGETS += named(["published", "audit"]).values()

@@ -7,12 +7,12 @@ rule report:
     log:
         f"{RESULTS}/logs/report.log",
     params:
-        **job("report"),
         settings={"results": RESULTS, "reproduced": REPRODUCED},
         optional=optional_digests,
         templates=template_digests(),
+        code=code("report"),
     script:
-        "../../scripts/job.py"
+        "../../scripts/report.py"
 
 
 # the page of one campaign, which needs its own jobs only
@@ -24,10 +24,10 @@ use rule report as campaign_report with:
     log:
         f"{RESULTS}/logs/report/{{campaign}}.log",
     params:
-        **job("report"),
         settings=lambda wildcards: {
             "results": RESULTS,
             "reproduced": REPRODUCED,
             "campaign": wildcards.campaign,
         },
         templates=template_digests(),
+        code=code("report"),

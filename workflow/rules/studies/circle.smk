@@ -19,14 +19,14 @@ if CIRCLE:
         log:
             f"{RESULTS}/logs/circle.log",
         params:
-            **job("circle"),
             settings={
                 "nominal": parts.nominal(config, _DIAGNOSED),
                 "masses": parts.masses(config, config["campaigns"][_DIAGNOSED]),
                 **reads("circle"),
             },
+            code=code("circle"),
         script:
-            "../../scripts/job.py"
+            "../../scripts/circle.py"
 
     rule circle:
         input:

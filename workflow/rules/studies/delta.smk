@@ -38,10 +38,10 @@ rule delta_images:
     log:
         f"{RESULTS}/logs/delta_images.log",
     params:
-        **job("delta_images"),
         settings=reads(*_SCENE),
+        code=code("delta_images"),
     script:
-        "../../scripts/job.py"
+        "../../scripts/delta_images.py"
 
 
 # it reads the images and the commands, never the truth
@@ -55,10 +55,10 @@ rule delta_vision:
     log:
         f"{RESULTS}/logs/delta_vision.log",
     params:
-        **job("delta_vision"),
         settings=reads(*_ROBOT, "delta.target.diameter_mm", "delta.target.pitch_mm"),
+        code=code("delta_vision"),
     script:
-        "../../scripts/job.py"
+        "../../scripts/delta_vision.py"
 
 
 rule delta_calibrate:
@@ -71,10 +71,10 @@ rule delta_calibrate:
     log:
         f"{RESULTS}/logs/delta_calibrate.log",
     params:
-        **job("delta_calibrate"),
         settings=reads(*_SCENE, "delta.spread", "delta.length_error_mm"),
+        code=code("delta_calibrate"),
     script:
-        "../../scripts/job.py"
+        "../../scripts/delta_calibrate.py"
 
 
 rule delta:

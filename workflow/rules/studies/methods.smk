@@ -19,11 +19,11 @@ rule compare_methods:
     wildcard_constraints:
         robot="|".join(METHOD_ROBOTS),
     params:
-        **job("methods"),
         settings=lambda wildcards: method_parts.settings(config, wildcards.robot),
         own_effects=own_effects_digests(),
+        code=code("methods"),
     script:
-        "../../scripts/job.py"
+        "../../scripts/methods.py"
 
 
 use rule gather as gather_methods with:

@@ -20,10 +20,10 @@ rule calibrate_printers:
     log:
         f"{RESULTS}/logs/printers.log",
     params:
-        **job("printers"),
         settings=reads("printers.stopping_step", "printers.level", "printers.confounded_from"),
+        code=code("printers"),
     script:
-        "../../scripts/job.py"
+        "../../scripts/printers.py"
 
 
 rule printers:

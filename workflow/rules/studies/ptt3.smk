@@ -54,11 +54,11 @@ rule ptt_measure:
     log:
         f"{RESULTS}/logs/ptt_measure.log",
     params:
-        **job("ptt_measure"),
         settings=reads(*_MEASURED, "ptt.joint", "ptt.bench", "ptt.positions_mm"),
         own_effects=own_effects_digests(),
+        code=code("ptt_measure"),
     script:
-        "../../scripts/job.py"
+        "../../scripts/ptt_measure.py"
 
 
 # one job, because starting five takes longer than the work
@@ -71,11 +71,11 @@ rule ptt_compensate:
     log:
         f"{RESULTS}/logs/ptt_compensate.log",
     params:
-        **job("ptt_compensate"),
         settings=reads(*_MEASURED, "ptt.network", "ptt.extrapolation", "ptt.redraws", "ptt.starts_deg"),
         own_effects=own_effects_digests(),
+        code=code("ptt_compensate"),
     script:
-        "../../scripts/job.py"
+        "../../scripts/ptt_compensate.py"
 
 
 rule ptt:

@@ -32,15 +32,15 @@ rule study_series:
     wildcard_constraints:
         set="|".join(REAL_ARMS) or "(?!)",
     params:
-        **job("real_series"),
         settings=lambda wildcards: {
             "series": wildcards.series,
             **real_series.part(config, wildcards.set),
             **reads("seed", "gap"),
         },
         own_effects=own_effects_digests(),
+        code=code("real_series"),
     script:
-        "../../scripts/job.py"
+        "../../scripts/real_series.py"
 
 
 rule study_arm:
@@ -56,15 +56,15 @@ rule study_arm:
     wildcard_constraints:
         set="|".join(REAL_ARMS) or "(?!)",
     params:
-        **job("real_arm", ARM_FIGURES),
         settings=lambda wildcards: {
             "figures": ARM_FIGURES,
             **real_series.part(config, wildcards.set),
             **reads("seed", "gap"),
         },
         own_effects=own_effects_digests(),
+        code=code("real_arm", ARM_FIGURES),
     script:
-        "../../scripts/job.py"
+        "../../scripts/real_arm.py"
 
 
 rule study_lengths:
@@ -78,10 +78,10 @@ rule study_lengths:
     wildcard_constraints:
         set="|".join(REAL_LENGTHS) or "(?!)",
     params:
-        **job("real_lengths", LENGTH_FIGURES),
         settings=lambda wildcards: {"figures": LENGTH_FIGURES, **real_series.part(config, wildcards.set)},
+        code=code("real_lengths", LENGTH_FIGURES),
     script:
-        "../../scripts/job.py"
+        "../../scripts/real_lengths.py"
 
 
 use rule gather as gather_real with:

@@ -58,7 +58,6 @@ rule sweep:
         parameter="|".join(SWEPT),
         population="|".join(config["sweep"]["populations"]),
     params:
-        **job("sweep"),
         settings=lambda wildcards: {
             **wildcards,
             "nominal": parts.nominal(config, REPRODUCED),
@@ -67,8 +66,9 @@ rule sweep:
             "reading": paper_a_settings.reading(config["sweep"], wildcards.operators),
             **reads("seed", *GENETIC_SETTINGS, "sweep.stall_generations", "calibration.use_near_singularity"),
         },
+        code=code("sweep"),
     script:
-        "../../scripts/job.py"
+        "../../scripts/sweep.py"
 
 
 rule sweep_tables:
@@ -79,10 +79,10 @@ rule sweep_tables:
     log:
         f"{RESULTS}/logs/sweep_tables.log",
     params:
-        **job("sweep_tables"),
         settings=reads("seed"),
+        code=code("sweep_tables"),
     script:
-        "../../scripts/job.py"
+        "../../scripts/sweep_tables.py"
 
 
 # the reproduced robot for other draws of non-repeatability and noise
@@ -92,10 +92,10 @@ rule redraws:
     log:
         f"{RESULTS}/logs/redraws.log",
     params:
-        **job("redraws"),
         settings=redraw_settings("redraws"),
+        code=code("redraws"),
     script:
-        "../../scripts/job.py"
+        "../../scripts/redraws.py"
 
 
 # which of many draws is nearest to what the paper prints: `draw` of the reproduced campaign
@@ -105,10 +105,10 @@ rule draw_ranks:
     log:
         f"{RESULTS}/logs/draw_ranks.log",
     params:
-        **job("draw_ranks"),
         settings=redraw_settings("ranked"),
+        code=code("draw_ranks"),
     script:
-        "../../scripts/job.py"
+        "../../scripts/draw_ranks.py"
 
 
 # an interrupted search goes on from its state
@@ -168,10 +168,10 @@ rule paper_a_figures:
     log:
         f"{RESULTS}/logs/figures/paper_a.log",
     params:
-        **job("figure", PAPER_A_FIGURES, CAMPAIGN_FIGURES),
         settings={"figures": PAPER_A_FIGURES | CAMPAIGN_FIGURES, "options": paper_options()},
+        code=code("figure", PAPER_A_FIGURES, CAMPAIGN_FIGURES),
     script:
-        "../../scripts/job.py"
+        "../../scripts/figure.py"
 
 
 rule campaign_figures:
@@ -184,13 +184,13 @@ rule campaign_figures:
     wildcard_constraints:
         campaign="|".join(CAMPAIGNS),
     params:
-        **job("figure", CAMPAIGN_FIGURES),
         settings=lambda wildcards: {
             "figures": CAMPAIGN_FIGURES,
             "options": parts.figure_options(config, wildcards.campaign),
         },
+        code=code("figure", CAMPAIGN_FIGURES),
     script:
-        "../../scripts/job.py"
+        "../../scripts/figure.py"
 
 
 # the 3-RRRU's

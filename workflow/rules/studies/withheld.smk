@@ -55,14 +55,14 @@ rule withheld_robots:
     log:
         f"{RESULTS}/logs/withheld_robots/{{chunk}}.log",
     params:
-        **job("withheld_robots"),
         settings=lambda wildcards: {
             "members": WITHHELD[wildcards.chunk],
             **WITHHELD_KNOWN[wildcards.chunk],
             **reads("motion"),
         },
+        code=code("withheld_robots"),
     script:
-        "../../scripts/job.py"
+        "../../scripts/withheld_robots.py"
 
 
 # it reads the measurements and the effects removed from its library, never the truth
@@ -77,15 +77,15 @@ rule withheld_diagnose:
     log:
         f"{RESULTS}/logs/withheld_diagnose/{{chunk}}.log",
     params:
-        **job("withheld_diagnose"),
         settings=lambda wildcards: {
             "robots": {one.name: (one.check, one.taken_out, one.file) for one in WITHHELD[wildcards.chunk]},
             **WITHHELD_MEASURED[wildcards.chunk],
             **reads("gap"),
         },
         own_effects=own_effects_digests(),
+        code=code("withheld_diagnose"),
     script:
-        "../../scripts/job.py"
+        "../../scripts/withheld_diagnose.py"
 
 
 rule withheld_score:
@@ -102,11 +102,11 @@ rule withheld_score:
     log:
         f"{RESULTS}/logs/withheld_score/{{chunk}}.log",
     params:
-        **job("withheld_score"),
         settings=lambda wildcards: {**WITHHELD_KNOWN[wildcards.chunk], **reads("motion", "gap")},
         own_effects=own_effects_digests(),
+        code=code("withheld_score"),
     script:
-        "../../scripts/job.py"
+        "../../scripts/withheld_score.py"
 
 
 # like the diagnosis, it never reads the truth
@@ -118,11 +118,11 @@ rule withheld_beliefs:
     log:
         f"{RESULTS}/logs/withheld_beliefs/{{chunk}}.log",
     params:
-        **job("withheld_beliefs"),
         settings=lambda wildcards: {"robots": RIVALLED[wildcards.chunk], **WITHHELD_ROBOT, **reads("gap")},
         own_effects=own_effects_digests(),
+        code=code("withheld_beliefs"),
     script:
-        "../../scripts/job.py"
+        "../../scripts/withheld_beliefs.py"
 
 
 rule withheld_methods:
@@ -134,10 +134,10 @@ rule withheld_methods:
     log:
         f"{RESULTS}/logs/withheld_methods.log",
     params:
-        **job("withheld_methods"),
         settings={},
+        code=code("withheld_methods"),
     script:
-        "../../scripts/job.py"
+        "../../scripts/withheld_methods.py"
 
 
 rule withheld_summary:
@@ -153,10 +153,10 @@ rule withheld_summary:
     log:
         f"{RESULTS}/logs/withheld_summary.log",
     params:
-        **job("withheld_summary"),
         settings={},
+        code=code("withheld_summary"),
     script:
-        "../../scripts/job.py"
+        "../../scripts/withheld_summary.py"
 
 
 # it drives the robots, so it reads their truth; the diagnosis that it calls has measurements alone
@@ -171,11 +171,11 @@ rule withheld_advice:
     log:
         f"{RESULTS}/logs/withheld_advice.log",
     params:
-        **job("withheld_advice"),
         settings={**WITHHELD_ROBOT, **reads("motion", "gap", "withheld.noise_mm", "withheld.advice")},
         own_effects=own_effects_digests(),
+        code=code("withheld_advice"),
     script:
-        "../../scripts/job.py"
+        "../../scripts/withheld_advice.py"
 
 
 # one job draws a robot and makes and judges its page: the diagnosis has files alone
@@ -185,15 +185,15 @@ rule withheld_statements:
     log:
         f"{RESULTS}/logs/withheld_statements/{{chunk}}.log",
     params:
-        **job("withheld_statements"),
         settings=lambda wildcards: {
             "chunk": STATEMENTS[wildcards.chunk],
             **reads("seed", "gap", *PAGE_CALIBRATION),
             **reads("withheld.sentences.stops", "withheld.sentences.mujoco_share"),
         },
         own_effects=own_effects_digests(),
+        code=code("withheld_statements"),
     script:
-        "../../scripts/job.py"
+        "../../scripts/withheld_statements.py"
 
 
 rule withheld_sentences:
@@ -204,10 +204,10 @@ rule withheld_sentences:
     log:
         f"{RESULTS}/logs/withheld_sentences.log",
     params:
-        **job("withheld_sentences"),
         settings={},
+        code=code("withheld_sentences"),
     script:
-        "../../scripts/job.py"
+        "../../scripts/withheld_sentences.py"
 
 
 # a separate part of the check
