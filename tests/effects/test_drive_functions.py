@@ -171,7 +171,7 @@ def test_the_waves_of_a_slide_make_any_function_of_its_stroke(robot, stroke, mot
     functions = effect.along_drives(replace(motion, drive=drive))
     for own in functions:
         np.testing.assert_allclose(own[:, 1:3], np.hstack([f(np.pi * along / stroke) for f in (np.sin, np.cos)]))
-        np.testing.assert_allclose(own[:, 9], np.cos(5.0 * np.pi * along[:, 0] / stroke), atol=1e-12)
+        np.testing.assert_allclose(own[:, 10], np.cos(5.0 * np.pi * along[:, 0] / stroke), atol=1e-12)
     again = effect.along_drives(replace(motion, drive=drive + 2.0 * stroke))
     np.testing.assert_allclose(again, functions, atol=1e-11)
 
