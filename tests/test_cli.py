@@ -40,6 +40,7 @@ def test_it_runs_as_a_command_of_its_own_in_any_folder(tmp_path):
     assert ended.returncode == cli.WRONG and "see `rrru --help`" in ended.stderr
 
 
+@pytest.mark.usefixtures("quick_figures")
 def test_a_diagnosis_prints_its_answer_and_where_its_files_are(tmp_path, capsys):
     arguments = ("data/field_12.csv", "--robot", "rrru3", "--noise", "0.02", "--set", "platform_mass_kg=3.0")
     # two that can be tested and two that this file cannot show

@@ -132,10 +132,9 @@ def is_labelled(figure, panel, direction):
 
 
 @pytest.mark.parametrize("name", FIGURES)
-def test_a_figure_is_complete_and_its_files_are_the_same_bytes_every_time(name, frames, tmp_path, monkeypatch):
-    # fewer points in the picture and simple fonts, which take a third of the time otherwise; the real ones are below
-    monkeypatch.setattr(style, "_DPI", 100)
-    monkeypatch.setitem(style._STYLE, "pdf.fonttype", 3)
+@pytest.mark.usefixtures("quick_figures")
+def test_a_figure_is_complete_and_its_files_are_the_same_bytes_every_time(name, frames, tmp_path):
+    # the real pictures and fonts are below
     first, again = draw(name, frames), draw(name, frames)
     style.save(first, files(tmp_path / "first"))
     style.save(again, files(tmp_path / "again"))
