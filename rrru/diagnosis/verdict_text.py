@@ -295,8 +295,20 @@ def _causes(facts: Facts) -> list[str]:
             said.append(
                 f"It is systematic, and no effect of the library explains it: {share} of it is like none of them."
             )
-        said += _looks_like(facts["unexplained_follows"])
+        said += [*_looks_like(facts["unexplained_follows"]), *_possible(facts)]
     return [*said, *_sure(facts, groups)] if said else []
+
+
+def _possible(facts: Facts) -> list[str]:
+    """The effects of the corrected model that are not named, where their shares are worth a sentence."""
+    parts = {part["part"]: part for part in facts["budget"] if part["kind"] == "effect"}
+    why = "It is not named, since it may make up for a part of what is unexplained."
+    return [
+        f"{share_with_interval(parts[name])} is possibly {readable(name)} (probability that it acts: "
+        f"{probability(parts[name]['probability'])}). {why}"
+        for name in facts["unnamed"]
+        if name in parts and parts[name]["share"] >= OPTIONS.min_mentioned_share and is_determined(parts[name])
+    ]
 
 
 def _looks_like(rows: Sequence[Facts]) -> list[str]:

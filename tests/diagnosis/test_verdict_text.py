@@ -189,6 +189,28 @@ def test_the_model_says_what_it_has_besides_the_named_causes(effects, who):
     )
 
 
+def test_a_cause_of_the_corrected_model_without_a_name_has_a_sentence_with_its_share():
+    budget = synthetic_gap.gap_budget(CAMPAIGN)
+    own = budget["part"] == "backlash"
+    budget.loc[own, ["part", "share", "share_low", "share_high", "probability"]] = (
+        "drive_compliance",
+        0.27,
+        0.08,
+        0.46,
+        1.0,
+    )
+    said = answered(budget, effects="link_flexure+unexplained", unnamed="drive_compliance")["sentences"]
+    (sentence,) = (one for one in said if "possibly" in one)
+    assert sentence == (
+        "27 % (95 %: 8 % to 46 %) is possibly drive compliance (probability that it acts: more than 0.99). It is not "
+        "named, since it may make up for a part of what is unexplained."
+    )
+    assert [claim.kind for claim in claims._of_text(sentence, claims._SENTENCES)] == ["a possible cause"]
+    budget.loc[own, "share"] = 0.01
+    said = answered(budget, effects="link_flexure+unexplained", unnamed="drive_compliance")["sentences"]
+    assert not any("possibly" in one for one in said)
+
+
 def test_confounded_causes_are_one_sentence_with_their_probabilities():
     causes = synthetic_gap.gap_attribute(CAMPAIGN)
     grouped = causes["effect"].isin(["link_flexure", "servo_lag"])

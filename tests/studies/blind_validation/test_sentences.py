@@ -80,6 +80,11 @@ _CASES = [
         ({"name": "backlash", "probability": "0.95"}, {}, _FACTS),
         ({"name": "servo lag", "probability": "more than 0.99"}, {}, _FACTS),
     ),
+    (
+        "a possible cause",
+        ({"name": "backlash", "acts": "0.95"}, {}, _FACTS),
+        ({"name": "servo lag", "acts": "more than 0.99"}, {}, _FACTS),
+    ),
     ("shares are not determined", ({}, {"before_mm": 0.02}, _FACTS), ({}, {}, _FACTS)),
     (
         "shares overlap",

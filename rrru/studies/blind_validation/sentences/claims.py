@@ -52,6 +52,8 @@ _SENTENCES = {
     "shares overlap": r"These shares add up to more than the gap.*",
     "something is unexplained": rf"(?:Another|It is systematic, and no effect .*:) "
     rf"(?:(?P<share>{_NUMBER}) %|(?:an )?undetermined share) .*",
+    "a possible cause": rf"{_NUMBER} %{_ENDS} is possibly (?P<name>[a-z ]+) "
+    rf"\(probability that it acts: (?P<acts>[^)]*)\)\. .*",
     "no cause is sure": r"No cause is probable enough to be named; .*",
     "the unexplained follows": r"The unexplained part follows .*",
     "causes by share": r"Causes by their share of the gap: (?P<listed>.*)\.",

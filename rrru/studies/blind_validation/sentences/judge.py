@@ -372,6 +372,7 @@ _JUDGES = {
     "a cause by its share": lambda stated, t, _: _one_of(stated["name"].split(" or "), t),
     "a group of causes": _group,
     "probability of a cause": _probability_of_cause,
+    "a possible cause": lambda stated, t, f: _probability_of_cause(stated | {"probability": stated["acts"]}, t, f),
     "probability of this answer": _probability,
     "it does not repeat": _scatter,
     "it is random error": _scatter,
