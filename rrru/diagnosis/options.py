@@ -219,8 +219,9 @@ class DiagnosisOptions:
     max_listed_sets: int = 20
     # a text that lists more fitted numbers says how many there are; the table has them; assumed
     max_listed_numbers: int = 3
-    # a compliance whose interval has an end below this share of its value may be zero and is not listed; assumed
-    min_compliance_ratio: float = 1e-3
+    # a size whose interval has an end below this share of its value may be zero: the interval of a size that cannot be
+    # negative ends next to zero and not on it; assumed
+    min_end_ratio: float = 1e-3
     # a share of the gap that is worth a sentence; assumed
     min_mentioned_share: float = 0.05
     # a share whose 95 % interval covers this part of 0 to 1 is not determined: the sentence gives no number; assumed

@@ -136,13 +136,19 @@ def acting_places(numbers: Sequence[Facts]) -> list[str]:
     return [place for place, its in by_place.items() if any(_is_not_zero(one, len(its)) for one in its)] or [*by_place]
 
 
+def is_off_zero(number: Facts) -> bool:
+    """Whether the 95 % interval of a number, a row of `gap_parameters`, is on one side of zero, not next to it."""
+    least = OPTIONS.min_end_ratio * abs(number["value"])
+    return bool(number["low_95"] > least or number["high_95"] < -least)
+
+
 def _is_not_zero(number: Facts, count: int) -> bool:
     """Whether the interval of one of so many numbers, a row of `gap_parameters`, does not hold zero."""
     value, low, high = (number[key] for key in ("value", "low_95", "high_95"))
     wider = float(ndtri(1.0 - 0.025 / count)) / QUANTILE_95
+    above, below = value - wider * (value - low) > 0.0, value + wider * (high - value) < 0.0
     # an interval that begins at zero, the bound of a size, stays there
-    above = low > 0.0 and value - wider * (value - low) > 0.0
-    return bool(above or (high < 0.0 and value + wider * (high - value) < 0.0))
+    return is_off_zero(number) and bool(above or below)
 
 
 def _effect_row(inference: InferenceResult, name: str) -> Row:

@@ -18,7 +18,7 @@ from rrru.diagnosis.result_notes import (
     REPEATABILITY_UNSURE,
     ROBOT_REPEATS,
 )
-from rrru.diagnosis.result_tables import acting_places
+from rrru.diagnosis.result_tables import acting_places, is_off_zero
 from rrru.diagnosis.verdict import NOT_TESTED, POSSIBLE
 from rrru.effects.causes import cause_texts
 from rrru.effects.protocol import is_per_load
@@ -428,8 +428,7 @@ def _sizes(parameters: Sequence[Facts]) -> list[str]:
     by_size: dict[str, list[str]] = {}
     for row in parameters:
         # a compliance that may be zero is not found: its part has little load, or none that varies
-        least, (low, high) = OPTIONS.min_compliance_ratio * abs(row["value"]), (row["low_95"], row["high_95"])
-        found = not is_per_load(row["unit"]) or low > least or high < -least
+        found = not is_per_load(row["unit"]) or is_off_zero(row)
         if found and np.isfinite(row["standard_error"] or np.nan):
             unit, factor = _READABLE.get(row["unit"], (row["unit"], 1.0))
             value, least_95, most_95 = (factor * row[key] for key in ("value", "low_95", "high_95"))

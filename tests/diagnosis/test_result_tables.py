@@ -34,6 +34,9 @@ def test_a_cause_acts_at_the_places_at_which_one_of_its_numbers_is_not_zero():
     many = [_number(f"sine1_{k}", "at joint 1", 2.5 * (k == 3), 1.0) for k in range(20)]
     few = [_number("sine2_1", "at joint 2", 2.5, 1.0)]
     assert acting_places([*many, *few]) == ["at joint 2"]
+    # of a size that cannot be negative the interval ends next to zero
+    sizes = [{"parameter": f"compliance{k}", "place": f"at joint {k}", "value": 2e-9, "high_95": 3e-9} for k in (1, 2)]
+    assert acting_places([sizes[0] | {"low_95": 1.2e-9}, sizes[1] | {"low_95": 1.8e-24}]) == ["at joint 1"]
     # all where none is beyond
     assert acting_places(many) == ["at joint 1"]
 
