@@ -148,7 +148,7 @@ class ModelEvidence:
             coordinates, gram = self.library[term.effect].coordinates, np.diag(self._whitened.gram(0)[0])
             matrix = spread(coordinates, term.legs)
             index = self._whitened.layout[0][term.effect, term.shape, SAME if term.legs == SAME else EACH]
-            index = index if term.legs in (EACH, SAME) else index[coordinates.legs == term.legs]
+            index = index if term.legs in (EACH, SAME) else index[np.isin(coordinates.legs, term.legs)]
             size = matrix.T @ coordinates.typical / matrix.sum(axis=0)
             power, total = (
                 (all_of[index] * size**2).sum() / (3.0 * len(self)) for all_of in (gram, self._whitened.whole)

@@ -2,11 +2,11 @@
 
 From a starting set on, the neighbours of the most probable set whose neighbours are not known yet are evaluated, again
 and again: sets with a term more, with one less, and with one term in place of another, be it the same effect on other
-legs or in another shape, then also with one term less. It ends when no such set has a relevant share of the posterior:
-a set that is left out then is several worse steps away from all relevant ones. This is the neighbourhood search of C.
-Hans, A. Dobra and M. West, "Shotgun stochastic search for large p regression", JASA 102 (2007), which visits sets in
-the order of their weight in place of a random one; the sets retained are those of Occam's window (D. Madigan and A.
-Raftery, JASA 89, 1994).
+legs, on one leg more or less, or in another shape, then also with one term less. It ends when no such set has a
+relevant share of the posterior: a set that is left out then is several worse steps away from all relevant ones. This is
+the neighbourhood search of C. Hans, A. Dobra and M. West, "Shotgun stochastic search for large p regression", JASA 102
+(2007), which visits sets in the order of their weight in place of a random one; the sets retained are those of Occam's
+window (D. Madigan and A. Raftery, JASA 89, 1994).
 
 A neighbour is evaluated where it may matter by what its term adds at the prior scales of the others, which stay.
 Once the coefficients of a set have been averaged over, the Gram matrix and the moments of all other columns are
@@ -23,8 +23,8 @@ the linearisation moves with the answer, a search only climbs: it ends at a set 
 neighbours, and is completed once its answer has come back.
 """
 
-from collections.abc import Collection, Iterable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Collection, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -39,7 +39,7 @@ from rrru.diagnosis.marginal_problem import posterior_mean
 from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.posterior import Posterior, Weighed, Weigher
 from rrru.diagnosis.settings import Prior
-from rrru.diagnosis.terms import EffectTerm, variants
+from rrru.diagnosis.terms import EACH, EffectTerm, on_neighbouring_legs, variants
 from rrru.diagnosis.whitened import DISCREPANCY_SCALES
 
 
@@ -121,7 +121,7 @@ class ModelSpace:
 
     def climb(self, start: Sequence[EffectTerm]) -> _Search:
         """A search from a set of terms on, until the neighbours of the most probable set have been evaluated."""
-        known = {term for term in start if term in self._terms}
+        known = {term for term in start if self._is_known(term)}
         found, first = _Search(), frozenset(known)
         self._evaluate(tuple(term for term in start if term in known), None, None, climb=True)
         for terms in ((), *((term,) for term in self._terms), first):
@@ -197,7 +197,7 @@ class ModelSpace:
             gains, best = self._gains(base.terms, scales, base.level)
             if out is not None:
                 # a replacement of a term adds more or less than that did
-                start = present - gains[self._candidates.terms.index(terms[out])]
+                start = self._without(centre.hypothesis, out, gains, base)
             heights = {
                 row: start + gain + self._weigher.terms((*base.terms, self._candidates.terms[row]))
                 for row, gain in enumerate(gains.tolist())
@@ -209,7 +209,8 @@ class ModelSpace:
                     break
                 chosen.append((heights[row], (*base.terms, self._candidates.terms[row]), np.append(scales, best[row])))
         chosen.sort(key=lambda one: -one[0])
-        for _, neighbour, scales in chosen[: OPTIONS.max_neighbours]:
+        nearest = [one[1:] for one in chosen[: OPTIONS.max_neighbours]]
+        for neighbour, scales in (*nearest, *self._on_neighbouring_legs(centre.hypothesis)):
             self._evaluate(neighbour, level, scales)
             found.reach(neighbour)
             if {term.effect for term in neighbour} == centre.hypothesis.effects:
@@ -219,6 +220,31 @@ class ModelSpace:
                     smaller = tuple(neighbour[k] for k in remaining)
                     self._evaluate(smaller, level, scales[remaining])
                     found.reach(smaller)
+
+    def _on_neighbouring_legs(self, centre: Hypothesis) -> Iterator[tuple[tuple[EffectTerm, ...], FloatArray]]:
+        """Sets that may matter with one term on a leg more or less, that term last, and their prior scales."""
+        terms, level = centre.terms, centre.level
+        scales = centre.prior_scales[level]
+        # at the same prior scales, which need not be averaged over to see that a leg is necessary or adds nothing
+        rest = centre.evidence.max() - self._at(terms, scales, level) if terms else 0.0
+        for out, term in enumerate(terms):
+            order = [*(k for k in range(len(terms)) if k != out), out]
+            for changed in on_neighbouring_legs(self.library[term.effect], term):
+                neighbour = (*(terms[k] for k in order[:-1]), changed)
+                height = rest + self._at(neighbour, scales[order], level) + self._weigher.terms(neighbour)
+                if height > self._highest - OPTIONS.window_nats:
+                    yield neighbour, scales[order]
+
+    def _without(self, hypothesis: Hypothesis, out: int, gains: FloatArray, smaller: Hypothesis) -> float:
+        """Log evidence of a hypothesis without the term `out`, where possible by the gains (c,) of the candidates."""
+        term = hypothesis.terms[out]
+        if term in self._candidates.terms:
+            return float(hypothesis.evidence.max() - gains[self._candidates.terms.index(term)])
+        return float(smaller.evidence.max())
+
+    def _is_known(self, term: EffectTerm) -> bool:
+        """Whether a term, on whichever legs, is of this space."""
+        return replace(term, legs=EACH) in self._terms
 
     def _evaluate(
         self, terms: Sequence[EffectTerm], level: int | None, prior_scales: FloatArray | None, climb: bool = False

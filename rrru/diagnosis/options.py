@@ -74,6 +74,8 @@ class DiagnosisOptions:
     discrepancy_white_share: float = 0.01
 
     # --- search over sets of effects and their evidence ---
+    # prior probability that an effect which may act on each leg by itself acts on several and not on all; assumed
+    prior_some_legs: float = 0.1
     # sets this far below the best are not worth an evaluation: e^-6 is 0.0025
     window_nats: float = 6.0
     # a set so far below the best at one level is tried at no other: e^-15 is 3e-7

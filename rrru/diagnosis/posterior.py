@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from math import comb
 from typing import Self
 
 import numpy as np
@@ -15,7 +16,7 @@ from rrru.diagnosis.evidence_kernels import log_sum_exp
 from rrru.diagnosis.hypothesis import Answer, Hypothesis
 from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.settings import Prior
-from rrru.diagnosis.terms import EACH, SAME, EffectTerm, shape_probabilities, variants
+from rrru.diagnosis.terms import EffectTerm, OnLegs, may_be_on_some, shape_probabilities, variants
 from rrru.diagnosis.whitened import discrepancy_scales
 
 
@@ -114,9 +115,9 @@ class Posterior:
         """Logarithm of the highest weight, up to the constant."""
         return float(self.log_weights.max(initial=-np.inf))
 
-    def legs(self, effect: str) -> dict[str | int, float]:
-        """Probability by legs ("each", "same", 1, 2, 3) of an effect, given that it acts."""
-        result: dict[str | int, float] = {}
+    def legs(self, effect: str) -> dict[OnLegs, float]:
+        """Probability by legs ("each", "same", 1, 2, 3, (1, 3)) of an effect, given that it acts."""
+        result: dict[OnLegs, float] = {}
         for hypothesis, weight in zip(self.hypotheses, self.weights, strict=True):
             for term in hypothesis.terms:
                 if term.effect == effect:
@@ -171,12 +172,15 @@ class Weigher:
         self._evidence, self._levels = evidence, discrepancy_scales(evidence.noise)
         self._prior = prior
         self._effects: dict[str, FloatArray] = {}
+        # by effect the probabilities that it acts on some legs, and that it acts on each, on all alike, or on one
+        self._kinds: dict[str, tuple[float, float]] = {}
         self._legs = {name: len(np.unique(effect.coordinates.legs)) for name, effect in library.items()}
         self._functions = sum(name in UNKNOWN for name in library)
         for name in library.keys() - UNKNOWN.keys():
             kinds = {term.legs if isinstance(term.legs, str) else "one" for term in variants(library[name])}
-            coordinates = library[name].coordinates
-            self._effects[name] = np.log(shape_probabilities(coordinates)) - np.log(len(kinds)) + coordinates.log_prior
+            coordinates, some = library[name].coordinates, may_be_on_some(library[name]) * OPTIONS.prior_some_legs
+            self._kinds[name] = some, (1.0 - some) / len(kinds)
+            self._effects[name] = np.log(shape_probabilities(coordinates)) + coordinates.log_prior
 
     def weighed(self, hypothesis: Hypothesis, least: float = -np.inf) -> Weighed:
         """The Weighed hypothesis; least: log weight below which it counts as unexplained without a test."""
@@ -195,9 +199,15 @@ class Weigher:
         total += (len(terms) - len(known)) * np.log(self._prior.unexplained / max(self._functions, 1))
         for term in known:
             total += self._effects[term.effect][term.shape]
-            if term.legs not in (EACH, SAME):
-                total -= np.log(self._legs[term.effect])
+            total += np.log(self._of_legs(term))
         return float(total)
+
+    def _of_legs(self, term: EffectTerm) -> float:
+        """Prior probability of a term's legs: numbers of them are equally probable, and choices of one number, too."""
+        count, (some, other) = self._legs[term.effect], self._kinds[term.effect]
+        if isinstance(term.legs, tuple):
+            return some / ((count - 2) * comb(count, len(term.legs)))
+        return other / count if isinstance(term.legs, int) else other
 
     def _of_levels(self, unexplained: BoolArray) -> FloatArray:
         """Log prior (levels,) of the discrepancy's levels: half of the part that is not unexplained has none at all."""

@@ -18,7 +18,7 @@ from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.payload_nuisance import WEIGHT
 from rrru.diagnosis.problem import GEOMETRY, DiagnosisProblem
 from rrru.diagnosis.shrink import ShrinkStep, shrink_table
-from rrru.diagnosis.terms import EffectTerm, per_leg, sites, spread
+from rrru.diagnosis.terms import EffectTerm, legs_text, per_leg, sites, spread
 from rrru.diagnosis.variance_by_factor import drive_errors, variance_by_factor
 from rrru.diagnosis.verdict import NOT_TESTED, Verdict, label
 from rrru.effects.harmonic import is_phase
@@ -161,7 +161,7 @@ def _effect_row(inference: InferenceResult, name: str) -> Row:
     best = max(holding, key=lambda h: h.evidence.max())
     row["log_evidence"] = float(best.evidence.max() - inference.evidence.on_library().none.max())
     if per_leg(inference.problem.library[name]) and (legs := posterior.legs(name)):
-        row["legs"] = str(max(legs.items(), key=lambda item: item[1])[0])
+        row["legs"] = legs_text(max(legs.items(), key=lambda item: item[1])[0])
     single = max((h for h in holding if len(h.terms) == 1), key=lambda h: h.evidence.max(), default=None)
     if single:
         level, held_out = int(single.evidence.argmax()), inference.held_out.on_complete(single.terms)
@@ -187,7 +187,7 @@ def _set_rows(inference: InferenceResult) -> pd.DataFrame:
         row = {
             "rank": rank,
             "effects": label(tuple(sorted(effects)), unexplained),
-            "legs": ", ".join(f"{term.effect}: {term.legs}" for term in hypothesis.terms),
+            "legs": ", ".join(f"{term.effect}: {legs_text(term.legs)}" for term in hypothesis.terms),
             "unexplained": unexplained,
             "probability": probability,
             "log_evidence": float(hypothesis.evidence.max() - none),

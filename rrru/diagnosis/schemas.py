@@ -132,8 +132,8 @@ decision               str    named: from a probability of 0.7 on; group: one of
     one acts as probably; possible: above 0.05; excluded; not tested: the reason is in note {named, group, possible,
     excluded, not tested}
 group_probability      float? that one of its group is at work; null where it is in none
-legs                   str    on each leg its own value, one value on all (same), or the one leg; empty where legs
-    make no difference
+legs                   str    on each leg its own value, one value on all (same), the one leg, or some legs with a
+    value each ("2 and 5"); empty where legs make no difference
 log_evidence           float? of the best hypothesis with this effect over none, natural logarithm
 heldout_gain           float? log predictive score gained at left-out points by adding it to the calibration
 heldout_gain_low       float? lower end, 95 %, from the folds; null where there is one

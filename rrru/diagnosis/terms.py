@@ -1,4 +1,4 @@
-"""Terms of hypotheses: one effect with fixed shape parameters, on all legs, with one value for all, or on one leg."""
+"""Terms of hypotheses: one effect with fixed shape parameters, on all legs, with one value for all, or on some legs."""
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
@@ -11,8 +11,10 @@ from rrru.diagnosis.state import LinearizedProblem
 from rrru.effects.protocol import Coordinates, Motion
 from rrru.kinematics.chain import active_sites
 
-# on which legs an effect acts: on each with its own value, on all with one value, or on one leg alone
+# on which legs an effect acts: on each with its own value, on all with one value, on one leg alone, or on some legs, in
+# order, each with its own value
 EACH, SAME = "each", "same"
+OnLegs = str | int | tuple[int, ...]
 
 
 @dataclass(frozen=True)
@@ -20,15 +22,15 @@ class EffectTerm:
     """One effect of a hypothesis.
 
     effect: its name; shape: number of the values of its nonlinear parameters in `Coordinates.shapes`, such as a gear
-    ratio; legs: EACH, SAME or the number of the one leg that it acts on.
+    ratio; legs: EACH, SAME, the number of the one leg that it acts on, or those of some of them.
     """
 
     effect: str
     shape: int = 0
-    legs: str | int = EACH
+    legs: OnLegs = EACH
 
 
-def spread(coordinates: Coordinates, legs: str | int) -> FloatArray:
+def spread(coordinates: Coordinates, legs: OnLegs) -> FloatArray:
     """Matrix (c, k) from the k free coefficients of a term on these legs to the effect's c coordinates."""
     every = np.eye(len(coordinates))
     if legs == EACH:
@@ -38,7 +40,7 @@ def spread(coordinates: Coordinates, legs: str | int) -> FloatArray:
         return np.asarray(
             np.stack([every[:, coordinates.legs == leg] for leg in np.unique(coordinates.legs)]).sum(axis=0)
         )
-    return every[:, coordinates.legs == legs]
+    return every[:, np.isin(coordinates.legs, legs)]
 
 
 def shape_probabilities(coordinates: Coordinates) -> FloatArray:
@@ -76,6 +78,38 @@ def variants(effect: TestedEffect) -> tuple[EffectTerm, ...]:
         *(np.unique(coordinates.legs).tolist() if legs else ()),
     )
     return tuple(EffectTerm(effect.name, shape, legs) for shape in range(len(coordinates.shapes)) for legs in choices)
+
+
+def may_be_on_some(effect: TestedEffect) -> bool:
+    """Whether an effect may act on some of a robot's legs: on several of them and not on all.
+
+    Not one with a distribution of many coefficients for every leg, whose sets would take too long.
+    """
+    coordinates = effect.coordinates
+    return per_leg(effect) and not (coordinates.broad or coordinates.sized) and len(np.unique(coordinates.legs)) > 2
+
+
+def on_neighbouring_legs(effect: TestedEffect, term: EffectTerm) -> tuple[EffectTerm, ...]:
+    """The terms of an effect that act on one leg more or less than a term, some legs or each; none for other terms.
+
+    A single leg and each of them are among `variants`; from them these lead to some of them.
+    """
+    if term.legs == SAME or not may_be_on_some(effect):
+        return ()
+    every = np.unique(effect.coordinates.legs).tolist()
+    present = every if term.legs == EACH else np.atleast_1d(np.array(term.legs)).tolist()
+    changed = [sorted({*present} ^ {leg}) for leg in every]
+    return tuple(replace(term, legs=_as_legs(legs, len(every))) for legs in changed if legs)
+
+
+def _as_legs(legs: list[int], count: int) -> OnLegs:
+    """Some of a number of legs as a term has them."""
+    return EACH if len(legs) == count else legs[0] if len(legs) == 1 else tuple(legs)
+
+
+def legs_text(legs: OnLegs) -> str:
+    """Legs of a term in a table: each, same, 2, or "2 and 5"."""
+    return " and ".join(map(str, legs)) if isinstance(legs, tuple) else str(legs)
 
 
 def signatures(library: Library, linear: LinearizedProblem, terms: Sequence[EffectTerm]) -> list[FloatArray]:

@@ -200,7 +200,8 @@ def _leg(legs, drives, noun):
     words = {"each": f"each {noun}", "same": f"all {noun}s alike", "": ""}
     if legs in words:
         return words[legs]
-    return drives[int(legs) - 1] if int(legs) <= len(drives) else f"{noun} {legs}"
+    numbers = [int(leg) for leg in legs.split(" and ")]
+    return ", ".join(drives[leg - 1] if leg <= len(drives) else f"{noun} {leg}" for leg in numbers)
 
 
 def _causes(axes, causes, verdict, words):

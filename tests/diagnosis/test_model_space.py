@@ -13,11 +13,11 @@ from rrru.diagnosis.model_space import Candidates, ModelSpace, explore
 from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.posterior import Posterior, Weigher
 from rrru.diagnosis.settings import Prior
-from rrru.diagnosis.terms import EffectTerm, variants
+from rrru.diagnosis.terms import EffectTerm, may_be_on_some, on_neighbouring_legs, variants
 from rrru.diagnosis.whitened import DISCREPANCY_SCALES
 from rrru.effects.library import find
 from rrru.robots.rrru3 import Rrru3
-from tests.diagnosis.campaigns import EFFECTS, measure, problem_of, strong
+from tests.diagnosis.campaigns import EFFECTS, active, measure, problem_of, strong
 
 # assembly errors that stand in for each other, and some that do not
 FEW = ("axis_tilt", "base_placement", "joint_axis_error", "frame_misregistration", "servo_lag")
@@ -30,10 +30,18 @@ def _evidence(acting, names=FEW):
     return evidence, library
 
 
+def _on_some_legs(effect):
+    """Terms of an effect on several of the legs and not on all."""
+    legs = np.unique(effect.coordinates.legs).tolist() if may_be_on_some(effect) else []
+    shapes = range(len(effect.coordinates.shapes))
+    some = [chosen for count in range(2, len(legs)) for chosen in combinations(legs, count)]
+    return [EffectTerm(effect.name, shape, chosen) for shape in shapes for chosen in some]
+
+
 def _of_all_sets(evidence, library):
     """Posterior of every set of up to four terms, each evaluated at all levels."""
     weigher, found = Weigher(evidence, Prior()), []
-    choices = {name: variants(effect) for name, effect in library.items()}
+    choices = {name: (*variants(effect), *_on_some_legs(effect)) for name, effect in library.items()}
     for size in range(5):
         for names in combinations(library, size):
             for terms in product(*(choices[name] for name in names)):
@@ -60,6 +68,30 @@ def test_probabilities_are_those_of_a_sum_over_all_sets(acting):
         expected.sets().get((frozenset(), False), 0.0), abs=0.02
     )
     assert found.apart < 0.02 and found.expanded > 0.8
+
+
+def test_all_choices_of_legs_are_neighbours_and_their_priors_sum_to_one():
+    evidence, library = _evidence((), ("backlash", "servo_lag", "base_placement"))
+    weigher = Weigher(evidence, Prior())
+    for effect in library.values():
+        every = {*variants(effect), *_on_some_legs(effect)}
+        of_legs = np.exp([weigher.terms((term,)) for term in every]).sum()
+        alone = np.exp(Prior().log_set(1, len(library)))
+        assert of_legs == pytest.approx(alone)
+        reached = {term for term in variants(effect) if term.legs == "each"}
+        for _ in range(4):
+            reached |= {near for term in reached for near in on_neighbouring_legs(effect, term)}
+        assert reached == {term for term in every if term.legs != "same"}
+
+
+@pytest.mark.parametrize("legs", [(2,), (1, 3)])
+def test_an_effect_on_some_of_the_legs_is_found_there(legs):
+    acting = active("backlash", [8e-4 * (leg in legs) for leg in (1, 2, 3)])
+    evidence, _ = _evidence((acting,), ("backlash", "friction_windup", "encoder_eccentricity"))
+    found = explore(evidence, Prior())
+    assert found.marginal("backlash") > 0.95 > 0.05 > found.marginal("friction_windup")
+    best = max(found.legs("backlash").items(), key=lambda one: one[1])[0]
+    assert best == (legs if len(legs) > 1 else legs[0])
 
 
 def test_the_answer_does_not_depend_on_where_the_search_begins():
