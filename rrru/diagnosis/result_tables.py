@@ -1,6 +1,7 @@
 """The tables behind a verdict."""
 
 from collections.abc import Collection, Iterator, Sequence
+from dataclasses import replace
 from itertools import zip_longest
 
 import numpy as np
@@ -18,7 +19,7 @@ from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.payload_nuisance import WEIGHT
 from rrru.diagnosis.problem import GEOMETRY, DiagnosisProblem
 from rrru.diagnosis.shrink import ShrinkStep, shrink_table
-from rrru.diagnosis.terms import EffectTerm, legs_text, per_leg, sites, spread
+from rrru.diagnosis.terms import EACH, EffectTerm, legs_text, per_leg, sites, spread
 from rrru.diagnosis.variance_by_factor import drive_errors, variance_by_factor
 from rrru.diagnosis.verdict import NOT_TESTED, Verdict, label
 from rrru.effects.harmonic import is_phase
@@ -102,12 +103,13 @@ def where(inference: InferenceResult, effects: Collection[str], numbers: pd.Data
     for term in inference.hypothesis.terms:
         if term.effect not in effects:
             continue
-        names, acting = sites(problem.library, problem.motion, term), None
+        own = acting = sites(problem.library, problem.motion, term)
         if per_leg(problem.library[term.effect]):
             places = acting_places(numbers[numbers["effect"] == term.effect].to_dict("records"))
             legs = np.unique(problem.library[term.effect].coordinates.legs).tolist()
             acting = sites(problem.library, problem.motion, term, [leg for leg in legs if words.place(leg) in places])
-        found += _ranges(names, acting or names)
+        every = sites(problem.library, problem.motion, replace(term, legs=EACH))
+        found += _ranges(every, acting or own)
     return ", ".join(dict.fromkeys(found))
 
 

@@ -13,11 +13,12 @@ from rrru.diagnosis.model_space import Candidates, ModelSpace, explore
 from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.posterior import Posterior, Weigher
 from rrru.diagnosis.settings import Prior
-from rrru.diagnosis.terms import EffectTerm, may_be_on_some, on_neighbouring_legs, variants
+from rrru.diagnosis.terms import EffectTerm, on_neighbouring_legs, variants
 from rrru.diagnosis.whitened import DISCREPANCY_SCALES
 from rrru.effects.library import find
 from rrru.robots.rrru3 import Rrru3
 from tests.diagnosis.campaigns import EFFECTS, active, measure, problem_of, strong
+from tests.diagnosis.every_term import every_term
 
 # assembly errors that stand in for each other, and some that do not
 FEW = ("axis_tilt", "base_placement", "joint_axis_error", "frame_misregistration", "servo_lag")
@@ -30,18 +31,10 @@ def _evidence(acting, names=FEW):
     return evidence, library
 
 
-def _on_some_legs(effect):
-    """Terms of an effect on several of the legs and not on all."""
-    legs = np.unique(effect.coordinates.legs).tolist() if may_be_on_some(effect) else []
-    shapes = range(len(effect.coordinates.shapes))
-    some = [chosen for count in range(2, len(legs)) for chosen in combinations(legs, count)]
-    return [EffectTerm(effect.name, shape, chosen) for shape in shapes for chosen in some]
-
-
 def _of_all_sets(evidence, library):
     """Posterior of every set of up to four terms, each evaluated at all levels."""
     weigher, found = Weigher(evidence, Prior()), []
-    choices = {name: (*variants(effect), *_on_some_legs(effect)) for name, effect in library.items()}
+    choices = {name: every_term(effect) for name, effect in library.items()}
     for size in range(5):
         for names in combinations(library, size):
             for terms in product(*(choices[name] for name in names)):
@@ -74,7 +67,7 @@ def test_all_choices_of_legs_are_neighbours_and_their_priors_sum_to_one():
     evidence, library = _evidence((), ("backlash", "servo_lag", "base_placement"))
     weigher = Weigher(evidence, Prior())
     for effect in library.values():
-        every = {*variants(effect), *_on_some_legs(effect)}
+        every = {*every_term(effect)}
         of_legs = np.exp([weigher.terms((term,)) for term in every]).sum()
         alone = np.exp(Prior().log_set(1, len(library)))
         assert of_legs == pytest.approx(alone)

@@ -9,6 +9,7 @@ from scipy import stats
 from scipy.special import logsumexp
 
 from rrru.diagnosis.hypothesis import Hypothesis
+from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.posterior import Posterior, Weigher
 from rrru.diagnosis.settings import GapSettings, Prior
 from rrru.diagnosis.terms import EACH, SAME, EffectTerm, per_leg, spread, variants
@@ -18,6 +19,7 @@ from rrru.estimation.noise_model import NoiseModel
 from rrru.robots.catalogue import make_mechanism
 from rrru.robots.rrru3 import Rrru3
 from tests.diagnosis.campaigns import EFFECTS, NOISE_MM
+from tests.diagnosis.every_term import every_term
 from tests.places import ROOT
 
 _OF_ALL = {"frame_misregistration", "thermal_growth", "joint_axis_error", "base_drift", "pedestal_compliance"}
@@ -44,6 +46,12 @@ def _arm():
     return GapSettings().library(make_mechanism("arm", {"urdf": str(ROOT / "data/models/arm6.urdf")}))
 
 
+def _three_of_an_arm():
+    """Three effects, each on 63 choices of legs."""
+    library = _arm()
+    return {name: library[name] for name in ("backlash", "drive_compliance", "encoder_eccentricity")}
+
+
 def _hypothesis(*terms, evidence=0.0):
     value = np.broadcast_to(np.asarray(evidence, dtype=float), len(DISCREPANCY_SCALES)).copy()
     return Hypothesis(tuple(terms), value, np.ones((len(DISCREPANCY_SCALES), len(terms))))
@@ -51,7 +59,7 @@ def _hypothesis(*terms, evidence=0.0):
 
 def _all(size, library=EFFECTS):
     """Every hypothesis of no, one or two effects."""
-    single = [term for effect in library.values() for term in variants(effect)]
+    single = [term for effect in library.values() for term in every_term(effect)]
     if size < 2:
         return [()] if size == 0 else [(term,) for term in single]
     return [(a, b) for k, a in enumerate(single) for b in single[k + 1 :] if a.effect != b.effect]
@@ -101,7 +109,7 @@ def test_without_data_the_probabilities_are_the_prior(arm):
     """All hypotheses of up to two effects alike: counts and the unexplained share come back, alike for all effects and
     pairs, however many legs there are.
     """
-    prior, library = Prior((0.3, 0.5, 0.2, 0.0001), 0.1, 0.1, share=0.0), _arm() if arm else EFFECTS
+    prior, library = Prior((0.3, 0.5, 0.2, 0.0001), 0.1, 0.1, share=0.0), _three_of_an_arm() if arm else EFFECTS
     every = [_hypothesis(*terms) for size in range(3) for terms in _all(size, library)]
     found = posterior(_stub(1.5, library), every, prior)
     assert found.weights.sum() == pytest.approx(1.0)
@@ -120,10 +128,12 @@ def test_without_data_the_probabilities_are_the_prior(arm):
 
 def test_legs_have_the_prior_of_their_kinds():
     found = posterior(_stub(), [_hypothesis(*terms) for size in range(2) for terms in _all(size)], Prior())
-    np.testing.assert_allclose(
-        [found.legs("backlash")[k] for k in (EACH, SAME, 1, 2, 3)], [1 / 3, 1 / 3, 1 / 9, 1 / 9, 1 / 9]
-    )
-    np.testing.assert_allclose([found.legs("axis_tilt")[k] for k in (EACH, 1, 2, 3)], [1 / 2, 1 / 6, 1 / 6, 1 / 6])
+    some = OPTIONS.prior_some_legs
+    for name, kinds in (("backlash", 3), ("axis_tilt", 2)):
+        legs, alike = found.legs(name), (1.0 - some) / kinds
+        np.testing.assert_allclose([legs[k] for k in (EACH, SAME)[: kinds - 1]], alike)
+        np.testing.assert_allclose([legs[k] for k in (1, 2, 3)], alike / 3)
+        np.testing.assert_allclose([legs[k] for k in ((1, 2), (1, 3), (2, 3))], some / 3)
     assert found.legs("unknown") == {}
     assert sum(found.legs("axis_tilt").values()) == pytest.approx(1.0)
 

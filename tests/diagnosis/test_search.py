@@ -42,6 +42,7 @@ from tests.diagnosis.campaigns import (
     problem_of,
     strong,
 )
+from tests.diagnosis.every_term import every_term
 
 FEW = ("leg_asymmetry", "servo_lag", "backlash")
 
@@ -60,7 +61,7 @@ def test_the_search_finds_what_an_enumeration_of_all_sets_finds(acting):
     problem = problem_of(measure(tuple(strong(name, 4.0) for name in acting)), _library(*FEW))
     evidence = problem.evidence(problem.linearise(calibrate(problem)))
     found = explore(evidence, Prior()).hypotheses
-    choices = {name: variants(EFFECTS[name]) for name in FEW}
+    choices = {name: every_term(EFFECTS[name]) for name in FEW}
     for size in range(3):
         every = [terms for names in combinations(FEW, size) for terms in product(*(choices[name] for name in names))]
         best = max(_score(evidence, terms).max() for terms in every)
