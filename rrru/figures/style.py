@@ -216,9 +216,12 @@ def arrange(figure):
         figure.set_layout_engine(None)
         # its solver's last digits differ from the first figure of a process to the next
         for axes in figure.axes:
+            arranged = axes.get_in_layout()
             for which in ("original", "active"):
                 place = axes.get_position(original=which == "original").bounds
                 axes.set_position(np.round(place, 9), which=which)
+            # a position that is set takes the panel out of every later arrangement
+            axes.set_in_layout(arranged)
 
 
 def height_axis(axes, z_down):
