@@ -58,7 +58,9 @@ def test_the_map_shows_the_used_points_gaps_in_the_plane_by_size(frames):
     np.testing.assert_allclose(ring, frames["gap_verdicts"][["worst_x_mm", "worst_y_mm"]].iloc[0].astype(float))
 
 
-@pytest.mark.parametrize("stretch", [(1.0, 1.0, 1.0), (1.0, 6.0, 1.0), (4.0, 6.0, 2.0), (1.0, 1.0, 8.0), (6.0, 1.0, 1.0)])
+@pytest.mark.parametrize(
+    "stretch", [(1.0, 1.0, 1.0), (1.0, 6.0, 1.0), (4.0, 6.0, 2.0), (1.0, 1.0, 8.0), (6.0, 1.0, 1.0)]
+)
 @pytest.mark.parametrize(("name", "first"), [("gap", 2), ("gap_map", 0)])
 def test_both_views_hold_every_point_and_share_x(name, first, stretch, frames, tmp_path):
     """Also of a gantry that goes far along one axis, for which the page is too low."""

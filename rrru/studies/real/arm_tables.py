@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from rrru.arrays import FloatArray
 from rrru.campaign import measurements as rows
 from rrru.diagnosis.drive_spectra import amplitudes
 from rrru.diagnosis.evidence import PRIOR_SCALES, averaged
@@ -169,6 +170,13 @@ def _points(studied: Studied) -> pd.DataFrame:
     )
 
 
+def _waves_of(values: FloatArray, number: int, drives: int) -> FloatArray:
+    """Numbers (orders, 2) of sine and cosine of one drive from those of all drives, each of which begins with its
+    constant.
+    """
+    return np.reshape(np.reshape(values, (drives, -1))[number, 1:], (-1, 2))
+
+
 def _spectrum(studied: Studied) -> pd.DataFrame:
     """Rows of `real_spectrum` of the rotary joints."""
     problem, robot = studied.problem, studied.problem.mechanism
@@ -182,10 +190,9 @@ def _spectrum(studied: Studied) -> pd.DataFrame:
         if found is not None and studied.diagnosis:
             errors = studied.diagnosis.tables["gap_parameters"]
             errors = errors.loc[errors["effect"] == _FUNCTION[0], "standard_error"].to_numpy()
-            shape = len(robot.parts.drives), -1, 2
             values = problem.library[_FUNCTION[0]].coordinates.to_values(found, {})
-            waves = np.reshape(values, shape)[number, : len(orders)]
-            error[: len(waves)] = np.reshape(errors, shape)[number, : len(orders)].mean(axis=1)
+            waves = _waves_of(values, number, len(robot.parts.drives))[: len(orders)]
+            error[: len(waves)] = _waves_of(errors, number, len(robot.parts.drives))[: len(orders)].mean(axis=1)
             sine[: len(waves)], cosine[: len(waves)] = waves.T
         reach = float(np.ptp(problem.motion.drive[problem.used][:, number]))
         parts.append(
