@@ -53,8 +53,14 @@ def budget(
 def _row(
     part: str, kind: str, squares: FloatArray, probability: float, total: float
 ) -> tuple[str, str, float, float, float, float, float]:
-    """One row of draws (b,) of a mean square, which may be negative where it is a product."""
-    mean, (low, high) = float(squares.mean()), np.quantile(squares, OPTIONS.interval_quantiles)
+    """One row of draws (b,) of a mean square, which may be negative where it is a product.
+
+    The interval of an effect that is probable enough for a name is that given that it acts: how probable that is has a
+    column of its own.
+    """
+    acting = kind == "effect" and probability >= OPTIONS.min_named_probability
+    mean, counted = float(squares.mean()), squares[squares > 0.0] if acting else squares
+    low, high = np.quantile(counted, OPTIONS.interval_quantiles) if len(counted) else (mean, mean)
     share, least, most = (float(one / total if total > 0.0 else 0.0) for one in (mean, min(low, mean), max(high, mean)))
     return part, kind, float(np.sign(mean) * np.sqrt(abs(mean))), share, least, most, float(probability)
 

@@ -83,7 +83,8 @@ kind                   str    effect; scatter: what does not repeat, noise above
     covariance, sampling, calibration}
 rms_mm                 float  root of its mean square, negative where that is
 share                  float  of the gap's mean square
-share_low              float  lower end, 95 %, from the posterior
+share_low              float  lower end, 95 %, from the posterior; of a cause that is probable enough for a name, given
+    that it acts
 share_high             float  upper end, 95 %, from the posterior
 probability            float? that the part is real; null where that is no question, or where no noise is stated
 

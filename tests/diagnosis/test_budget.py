@@ -5,6 +5,7 @@ import pytest
 
 from rrru.calibration.calibrate import calibrate
 from rrru.campaign import measurements as rows
+from rrru.diagnosis.budget import _row
 from rrru.diagnosis.settings import GapSettings
 from rrru.estimation.observations.target_positions import TargetPositions
 from tests.diagnosis.campaigns import (
@@ -45,6 +46,15 @@ def two():
     """Budget of a robot with two effects, and these."""
     effects = strong("backlash", 5.0), strong("link_flexure", 5.0)
     return *_budget(measure(effects)), effects
+
+
+def test_the_interval_of_a_probable_cause_is_that_given_that_it_acts():
+    """How probable that is has a column of its own; of an improbable one it is that of all draws."""
+    draws = np.concatenate([np.zeros(100), np.random.default_rng(0).uniform(0.9, 1.0, 900)])
+    *_, share, low, high, _ = _row("backlash", "effect", draws, 0.9, 1.0)
+    assert share == pytest.approx(draws.mean()) and 0.85 < low <= share and high > 0.99
+    *_, low, _, _ = _row("backlash", "effect", draws, 0.4, 1.0)
+    assert low == 0.0
 
 
 def test_parts_add_up_to_the_gap(two):
