@@ -30,17 +30,19 @@ def for_robot(robot: Robot) -> Effect | None:
     legs = robot.legs
     if len(legs.legs) != 1 or not legs.arm_joints or legs.coupling is not None:
         return None
-    links = _links(legs)
-    if len(links) < 2:
+    drives = [*_links(legs)]
+    if len(drives) < 2:
         return None
     parameters = ParameterSet(
-        (*(Parameter(f"strain{k}", "1", 0.0, 0.0, _MOST, _SOURCE, k) for k in links), TIME_CONSTANT)
+        (*(Parameter(f"strain{k}", "1", 0.0, 0.0, _MOST, _SOURCE, k) for k in drives), TIME_CONSTANT)
     )
 
     def grown(motion: Motion, values: FloatArray) -> Contribution:
         """Shifts of the links' ends by their growth under the strains and the time constant in s."""
         *strains, time_constant = values
-        longer = sum(strain * links[k] for k, strain in zip(links, strains, strict=True))
+        # the measured robot may have more sites, those of reflectors
+        links = _links(motion.robot.legs)
+        longer = sum(strain * links[k] for k, strain in zip(drives, strains, strict=True))
         return Contribution(np.multiply.outer(warm_up_fraction(motion, time_constant), longer))
 
     return Effect("link_growth", parameters, plain_coordinates(parameters, _TYPICAL, SHAPES), grown, ("time_s",))

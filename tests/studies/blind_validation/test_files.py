@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from rrru.campaign import measurements as rows
+from rrru.diagnosis.settings import GapSettings
 from rrru.effects.library import find
 from rrru.errors import UnreachableError
-from rrru.studies.blind_validation import draw, robots
+from rrru.studies.blind_validation import draw, robots, score
 from rrru.studies.blind_validation.causes import KINDS, Fault, draw_fault, kinds_of
 from rrru.studies.blind_validation.chunks import Member
 from rrru.studies.blind_validation.noise import NoiseModel
@@ -188,3 +189,16 @@ def _budget():
     import pandas as pd
 
     return pd.DataFrame(columns=["part", "kind", "rms_mm", "share", "share_low", "share_high", "probability"])
+
+
+@pytest.mark.parametrize("file", FILES)
+def test_effects_of_the_nominal_robot_act_on_the_one_with_reflectors(file):
+    """Its reflectors are sites, too: the score uses the effects of the nominal robot on it."""
+    known = conditions(file)
+    about = score.Known(known, GapSettings().library(known.mechanism))
+    problem = score._problem(robots.noise_free(short("own", file), known), about, about.library)
+    sites = len(problem.mechanism.legs.sites)
+    for name, effect in about.library.items():
+        coordinates = effect.coordinates
+        values = coordinates.to_values(coordinates.typical, coordinates.shapes[0])
+        assert effect.contribute(problem.motion, values).twists.shape[1] == sites, name
