@@ -16,6 +16,7 @@ import pandas as pd
 from rrru.diagnosis.make_problem import make_diagnosis_problem
 from rrru.diagnosis.state import ModelState
 from rrru.effects.library import HOLDS
+from rrru.errors import SimulationError
 from rrru.studies.blind_validation.causes import EFFECTS
 from rrru.studies.blind_validation.draw import fresh
 from rrru.studies.blind_validation.parts import causes_of, empty_causes, groups_of, is_enough, parts
@@ -125,12 +126,17 @@ def _problem(measurements, about, library, mechanism=None):
 
 
 def true_share(robot, about, mechanism, calibrated, corrected):
-    """Fraction of the true gap that the corrected model explains on new runs; NaN without gap or with a lost pose.
+    """Fraction of the true gap that the corrected model explains on new runs.
+
+    NaN without a gap, with a lost pose, and where MuJoCo does not bring the robot to rest.
 
     mechanism: with the calibrated parameters; corrected: the ModelState and its effects by name.
     """
     state, effects = corrected
-    driven = noise_free(fresh(robot, about.conditions), about.conditions) if robot.causes else None
+    try:
+        driven = noise_free(fresh(robot, about.conditions), about.conditions) if robot.causes else None
+    except SimulationError:
+        driven = None
     if driven is None:
         return np.nan
     problem = _problem(driven, about, about.library, mechanism)
