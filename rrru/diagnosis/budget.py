@@ -28,7 +28,7 @@ def budget(
     inference: InferenceResult, stated_mm: float | None, generator: np.random.Generator, draws: int
 ) -> pd.DataFrame:
     """Rows of `gap_budget` without the campaign; stated_mm: the instrument's noise per axis, None where unknown."""
-    squares, products, fitted = _drawn(inference, generator, draws)
+    squares, acting, products, fitted = _drawn(inference, generator, draws)
     instrument_mm2, noise = _noise_parts(inference, stated_mm, generator, draws)
     residual = inference.problem.residual(inference.calibrated)
     instrument = float(instrument_mm2.mean())
@@ -47,19 +47,20 @@ def budget(
     rows.append(("sampling", "sampling", np.array([gap - known]), np.nan))
     rows.append(("calibration", "calibration", calibration, np.nan))
     total = gap + float(calibration[0])
-    return pd.DataFrame([_row(*row, total) for row in rows], columns=COLUMNS)
+    given = {name: acts for name, acts in acting.items() if posterior.marginal(name) >= OPTIONS.min_named_probability}
+    made = [_row(*row, total, given.get(row[0]) if row[1] == "effect" else None) for row in rows]
+    return pd.DataFrame(made, columns=COLUMNS)
 
 
 def _row(
-    part: str, kind: str, squares: FloatArray, probability: float, total: float
+    part: str, kind: str, squares: FloatArray, probability: float, total: float, given: BoolArray | None = None
 ) -> tuple[str, str, float, float, float, float, float]:
     """One row of draws (b,) of a mean square, which may be negative where it is a product.
 
-    The interval of an effect that is probable enough for a name is that given that it acts: how probable that is has a
-    column of its own.
+    given: draws (b,) that the interval is of, None for all. That of an effect that is probable enough for a name is
+    that given that it acts: how probable that is has a column of its own.
     """
-    acting = kind == "effect" and probability >= OPTIONS.min_named_probability
-    mean, counted = float(squares.mean()), squares[squares > 0.0] if acting else squares
+    mean, counted = float(squares.mean()), squares if given is None else squares[given]
     low, high = np.quantile(counted, OPTIONS.interval_quantiles) if len(counted) else (mean, mean)
     share, least, most = (float(one / total if total > 0.0 else 0.0) for one in (mean, min(low, mean), max(high, mean)))
     return part, kind, float(np.sign(mean) * np.sqrt(abs(mean))), share, least, most, float(probability)
@@ -67,9 +68,9 @@ def _row(
 
 def _drawn(
     inference: InferenceResult, generator: np.random.Generator, draws: int
-) -> tuple[dict[str, FloatArray], dict[tuple[str, str], FloatArray], float]:
-    """Draws (b,) of mean squares, of effects and of what is unexplained, by name, and of products of two of them; the
-    share of the noise that the calibration absorbs.
+) -> tuple[dict[str, FloatArray], dict[str, BoolArray], dict[tuple[str, str], FloatArray], float]:
+    """Draws (b,) of mean squares, of effects and of what is unexplained, by name, in which of them each acts, and draws
+    of products of two of them; the share of the noise that the calibration absorbs.
     """
     problem, evidence, posterior = inference.problem, inference.evidence, inference.posterior
     linear, lacks_fit = evidence.linear, inference.lacks_fit
@@ -79,6 +80,7 @@ def _drawn(
     counts = np.bincount(generator.choice(len(weights), draws, p=weights / weights.sum()), minlength=len(weights))
     names = [name for name in problem.effects if posterior.marginal(name) > OPTIONS.min_budget_probability]
     squares = {name: np.zeros(draws) for name in (*names, _UNEXPLAINED)}
+    acting = {name: np.zeros(draws, dtype=bool) for name in names}
     products, first = {pair: np.zeros(draws) for pair in combinations(squares, 2)}, 0
     for number in np.flatnonzero(counts):
         row, level = map(int, np.unravel_index(number, posterior.weights.shape))
@@ -87,6 +89,8 @@ def _drawn(
         parts = _parts(evidence, posterior.hypotheses[row], level, left, generator, counts[number])
         for name in set(parts) & set(squares):
             squares[name][some] = (parts[name] ** 2).sum(axis=0) / count
+        for name in set(parts) & set(acting):
+            acting[name][some] = True
         for pair in products:
             if set(pair) <= set(parts):
                 products[pair][some] = 2.0 * (parts[pair[0]] * parts[pair[1]]).sum(axis=0) / count
@@ -94,7 +98,7 @@ def _drawn(
             beyond = data - sum(parts.values(), np.zeros((len(data), counts[number])))
             spare = 3.0 * problem.noise_mm**2 * (1.0 - left.taken)
             squares[_UNEXPLAINED][some] += np.maximum((beyond**2).sum(axis=0) / count - spare, 0.0)
-    return squares, products, left.taken
+    return squares, acting, products, left.taken
 
 
 class _LeftByCalibration:

@@ -273,7 +273,7 @@ def _decide(
             ordered = order_by_share(fitted)
             shares = {term.effect: share for term, share in ordered}
             # decided once, with all effects fitted: an effect that is left out would be a part of the remainder
-            if not small and (small := _small(fitted, shares, verdict)):
+            if not small and (small := _small(fitted, verdict)):
                 unnamed = tuple(name for name in verdict.effects if name in small and shares.get(name, 0.0) > 0.0)
                 continue
             if any(shares.get(name, 1.0) <= 0.0 for name in unnamed):
@@ -286,11 +286,13 @@ def _decide(
         inference = inference.with_posterior(_without(inference, ruled_out, worse, prior))
 
 
-def _small(inference: InferenceResult, shares: dict[str, float], verdict: Verdict) -> frozenset[str]:
-    """Effects of a verdict that may be a part of the remainder; shares: of the gap, of each effect."""
+def _small(inference: InferenceResult, verdict: Verdict) -> frozenset[str]:
+    """Effects of a verdict that may be a part of the remainder."""
     # shares are of positions on the robot: reflectors elsewhere may show effects that hardly move these
     if not verdict.unexplained or inference.problem.on_world.any():
         return frozenset()
+    hypothesis, level = inference.hypothesis, inference.level
+    shares = inference.held_out.shares(hypothesis.terms, hypothesis.prior_scales[level], level)
     found = {name for name, share in shares.items() if share < OPTIONS.min_share_with_unexplained}
     residual = inference.problem.residual(inference.calibrated)[inference.problem.on_robot]
     gap_mm = float(np.sqrt((residual**2).sum(axis=1).mean()))

@@ -118,6 +118,33 @@ class HeldOut:
                 spread[out] = fit.half(together[out].reshape(-1, len(fit.mean))).T.reshape(-1, 3, len(fit.mean))
         return Prediction(residual, spread, self._left(level), self.problem.series if self._whole_runs else None)
 
+    def shares(
+        self, terms: Sequence[EffectTerm], prior_scales: Sequence[float] | FloatArray, level: int
+    ) -> dict[str, float]:
+        """Share of the gap's mean square by effect: the mean product of its predicted part and the gap.
+
+        An effect has half of what it shares with another one (covariance decomposition: Li et al., Global sensitivity
+        analysis for systems with independent and/or correlated inputs, Journal of Physical Chemistry A 114, 2010). Two
+        large parts that cancel have none, and none takes the part of another one because it comes first. A part is
+        predicted at each reading by the fit without its fold: what a rough function follows by chance is no share. The
+        gap and the parts are those at the positions on the robot that a calibration leaves.
+        """
+        linear, rows = self.evidence.linear, self.problem.on_robot
+        calibration, *blocks = self._blocks(terms)
+        ends = np.cumsum([block.shape[-1] for block in (calibration, *blocks)])
+        parts = np.empty((*linear.data.shape, len(terms)))
+        for number, fit in self._fits(terms, prior_scales, level).items():
+            out = self.fold == number
+            for k, (block, first) in enumerate(zip(blocks, ends, strict=False)):
+                parts[out, :, k] = block[out] @ fit.mean[first : first + block.shape[-1]]
+        basis, _ = np.linalg.qr(calibration.reshape(-1, calibration.shape[-1]))
+        flat = np.concatenate([parts, linear.data[..., None]], axis=-1).reshape(len(basis), -1)
+        left = (flat - basis @ (basis.T @ flat)).reshape(*linear.data.shape, -1)[rows]
+        gap = left[..., -1]
+        taken = float((basis.reshape(*linear.data.shape, -1)[rows] ** 2).sum() / gap.size)
+        total = max(float((gap**2).sum()) - gap.size * self.problem.noise_mm**2 * (1.0 - taken), 1e-300)
+        return {term.effect: float((left[..., k] * gap).sum()) / total for k, term in enumerate(terms)}
+
     def spread_at_new_stops(
         self, terms: Sequence[EffectTerm], prior_scales: Sequence[float] | FloatArray, level: int
     ) -> FloatArray:

@@ -51,8 +51,11 @@ def two():
 def test_the_interval_of_a_probable_cause_is_that_given_that_it_acts():
     """How probable that is has a column of its own; of an improbable one it is that of all draws."""
     draws = np.concatenate([np.zeros(100), np.random.default_rng(0).uniform(0.9, 1.0, 900)])
-    *_, share, low, high, _ = _row("backlash", "effect", draws, 0.9, 1.0)
+    *_, share, low, high, _ = _row("backlash", "effect", draws, 0.9, 1.0, np.arange(1000) >= 100)
     assert share == pytest.approx(draws.mean()) and 0.85 < low <= share and high > 0.99
+    # one that acts may have no part: signs are those of the model
+    *_, low, _, _ = _row("backlash", "effect", draws, 0.95, 1.0, np.arange(1000) >= 50)
+    assert low == 0.0
     *_, low, _, _ = _row("backlash", "effect", draws, 0.4, 1.0)
     assert low == 0.0
 
@@ -118,3 +121,14 @@ def test_whoever_does_not_know_the_weight_still_knows_what_gives_way_in_all():
         errors.append(tables["gap_parameters"].query("effect == 'drive_compliance'")["standard_error"].mean())
     assert errors[0] > 5.0 * errors[1]
     assert shares[0] < 1.5 * shares[1]
+
+
+@pytest.mark.parametrize("strengths", [(8.0, 12.0), (10.0, 5.0)])
+def test_a_large_effect_has_a_name_where_another_one_could_explain_most_of_it(strengths):
+    """Next to something unexplained a small effect has none; each of these two alone explains most of their sum."""
+    names = "drive_compliance", "link_flexure"
+    frame = measure(tuple(map(strong, names, strengths)))
+    passed = 2.0 * frame["time_s"] / frame["time_s"].max() - 1.0
+    frame["measured_z_mm"] += 0.15 * passed**2
+    frame["measured_x_mm"] -= 0.08 * (4.0 * passed**3 - 3.0 * passed)
+    assert {*diagnosed(frame, NOISE_MM).verdict["effects"].split("+")} == {*names, "unexplained"}

@@ -10,7 +10,9 @@ import pytest
 from scipy.fft import dct
 from scipy.stats import multivariate_normal, norm
 
+from rrru.calibration.calibrate import calibrate as calibrate_positions
 from rrru.calibration.campaign_noise import campaign_noise
+from rrru.campaign import measurements as rows
 from rrru.campaign.outliers import isolated
 from rrru.diagnosis import shrink
 from rrru.diagnosis.calibrate import calibrate
@@ -19,6 +21,7 @@ from rrru.diagnosis.inference import with_noise
 from rrru.diagnosis.terms import EffectTerm
 from rrru.diagnosis.whitened import DISCREPANCY_SCALES
 from rrru.errors import ConfigError
+from rrru.estimation.observations.target_positions import TargetPositions
 from rrru.studies.real import length_tables
 from tests.diagnosis.campaigns import (
     EFFECTS,
@@ -131,6 +134,55 @@ def test_errors_of_predictions_by_a_true_effect_are_noise_and_their_own_uncertai
     expected = 3.0 * NOISE_MM**2 + found.uncertainty_mm2
     ratio = ((found.residual_mm**2).sum(axis=1) / expected).mean()
     assert ratio == pytest.approx(1.0, abs=4.0 * np.sqrt(2.0 / (3.0 * len(full.problem))))
+
+
+def test_the_share_of_an_effect_has_half_of_what_it_shares_with_another_one():
+    """Against the parts that were simulated: the mean product of each with the whole gap."""
+    effects = strong("drive_compliance", 8.0), strong("link_flexure", 12.0)
+    found = diagnosed(measure(effects), NOISE_MM).inference
+    terms, level = found.hypothesis.terms, found.level
+    shares = found.held_out.shares(terms, found.hypothesis.prior_scales[level], level)
+    parts = {one.effect.name: _left_by_calibration((one,)) for one in effects}
+    gap = _left_by_calibration(effects)
+    assert set(shares) == set(parts)
+    for name, part in parts.items():
+        assert shares[name] == pytest.approx((part * gap).sum() / (gap**2).sum(), abs=0.06)
+    assert sum(shares.values()) == pytest.approx(1.0, abs=0.02)
+
+
+def _left_by_calibration(effects):
+    """Residuals (n, 3) of a calibration of a robot with these effects, by the exact closure without noise."""
+    frame = measure(effects, noise_mm=0.0)
+    driven = rows.actuators(frame, MODEL), rows.measured(frame), rows.command(frame)
+    return calibrate_positions(TargetPositions(MODEL, *driven)).residual_mm
+
+
+def test_shares_are_of_parts_that_a_refit_without_the_fold_predicts():
+    held_out = _setting((FORWARD,), (strong("leg_asymmetry", 3.0),))
+    linear, scales = held_out.evidence.linear, held_out.evidence.scales(TERMS, PRIOR_SCALES)
+    blocks = [linear.base, linear.columns["servo_lag", 0][..., 1:2], linear.columns["leg_asymmetry", 0]]
+    columns, ends = np.concatenate(blocks, axis=-1), np.cumsum([block.shape[-1] for block in blocks])
+    prior = np.diag(np.concatenate([np.zeros(ends[0]), NOISE_MM / scales]))
+    parts = np.zeros((2, *linear.data.shape))
+    for number in np.unique(held_out.fold):
+        out = held_out.fold == number
+        design = np.concatenate([columns[~out].reshape(-1, ends[-1]), prior])
+        size = np.linalg.norm(design, axis=0)
+        data = np.append(linear.data[~out].ravel(), np.zeros(len(prior)))
+        fitted = np.linalg.lstsq(design / size, data, rcond=None)[0] / size
+        for k in range(2):
+            parts[k, out] = columns[out][..., ends[k] : ends[k + 1]] @ fitted[ends[k] : ends[k + 1]]
+
+    def left(values):
+        design = linear.base.reshape(values.size, -1)
+        size = np.linalg.norm(design, axis=0)
+        return values.ravel() - design / size @ np.linalg.lstsq(design / size, values.ravel(), rcond=None)[0]
+
+    gap = left(linear.data)
+    total = gap @ gap - NOISE_MM**2 * (gap.size - ends[0])
+    shares = held_out.shares(TERMS, PRIOR_SCALES, 0)
+    assert list(shares) == ["servo_lag", "leg_asymmetry"] and shares["leg_asymmetry"] > 0.9
+    np.testing.assert_allclose(list(shares.values()), [left(part) @ gap / total for part in parts], atol=1e-6)
 
 
 def _of_runs(run):
