@@ -43,7 +43,7 @@ from rrru.diagnosis.result_notes import (
 )
 from rrru.diagnosis.result_tables import details_of, left_out, left_out_note, parameter_rows, where
 from rrru.diagnosis.settings import GapSettings, Prior
-from rrru.diagnosis.shrink import CLOSED, ShrinkStep, order_by_share, share_closed, shrink_steps
+from rrru.diagnosis.shrink import CLOSED, ShrinkStep, losses_without, order_by_share, share_closed, shrink_steps
 from rrru.diagnosis.state import ModelState
 from rrru.diagnosis.terms import EffectTerm
 from rrru.diagnosis.variance_by_factor import worst_spot
@@ -293,12 +293,13 @@ def _small(inference: InferenceResult, verdict: Verdict) -> frozenset[str]:
         return frozenset()
     hypothesis, level = inference.hypothesis, inference.level
     shares = inference.held_out.shares(hypothesis.terms, hypothesis.prior_scales[level], level)
-    found = {name for name, share in shares.items() if share < OPTIONS.min_share_with_unexplained}
+    losses, least = losses_without(inference), OPTIONS.min_share_with_unexplained
+    found = {name for name, share in shares.items() if min(share, losses[name]) < least}
     residual = inference.problem.residual(inference.calibrated)[inference.problem.on_robot]
     gap_mm = float(np.sqrt((residual**2).sum(axis=1).mean()))
     alike, left_mm = followed_alike(inference, remainder_rows(inference), tuple(shares))
-    least = OPTIONS.min_size_per_remainder * left_mm
-    return frozenset(found | {name for name in alike if np.sqrt(max(shares[name], 0.0)) * gap_mm < least})
+    least_mm = OPTIONS.min_size_per_remainder * left_mm
+    return frozenset(found | {name for name in alike if np.sqrt(max(shares[name], 0.0)) * gap_mm < least_mm})
 
 
 def _without(inference: InferenceResult, ruled_out: set[str], worse: set[str], prior: Prior) -> Posterior:

@@ -60,23 +60,35 @@ def gap_rms(squares: FloatArray) -> float:
 
 def order_by_share(inference: InferenceResult) -> tuple[tuple[EffectTerm, float], ...]:
     """(term, share of the gap's mean square on left-out points that it removes when it comes next), largest first."""
-    hypothesis, level = inference.hypothesis, inference.level
-    left, result = list(hypothesis.terms), []
+    left, result = list(inference.hypothesis.terms), []
     chosen: list[EffectTerm] = []
-    noise, counted = 3.0 * inference.problem.noise_mm**2, inference.problem.on_robot
-
-    def gap(terms: Sequence[EffectTerm]) -> float:
-        prediction = inference.held_out.predict(terms, hypothesis.strengths_of(terms, level), level, uncertain=False)
-        return max(float((prediction.residual_mm[counted] ** 2).sum(axis=1).mean()) - noise, 0.0)
-
-    start = now = gap([])
+    start = now = _gap_mm2(inference, [])
     while left:
-        after = [gap([*chosen, term]) for term in left]
+        after = [_gap_mm2(inference, [*chosen, term]) for term in left]
         best = int(np.argmin(after))
         result.append((left[best], (now - after[best]) / max(start, 1e-12)))
         now = after[best]
         chosen.append(left.pop(best))
     return tuple(result)
+
+
+def losses_without(inference: InferenceResult) -> dict[str, float]:
+    """By effect of the fit how much larger the mean square gap on left-out points is without it.
+
+    As a share of what remains with all of them.
+    """
+    terms = inference.hypothesis.terms
+    remains = max(_gap_mm2(inference, terms), 1e-300)
+    without = {one.effect: _gap_mm2(inference, [term for term in terms if term != one]) for one in terms}
+    return {name: gap / remains - 1.0 for name, gap in without.items()}
+
+
+def _gap_mm2(inference: InferenceResult, terms: Sequence[EffectTerm]) -> float:
+    """Mean square gap on left-out points with some terms of the hypothesis, less noise, zero where noise explains it."""
+    hypothesis, level, problem = inference.hypothesis, inference.level, inference.problem
+    prediction = inference.held_out.predict(terms, hypothesis.strengths_of(terms, level), level, uncertain=False)
+    squares = (prediction.residual_mm[problem.on_robot] ** 2).sum(axis=1)
+    return max(float(squares.mean()) - 3.0 * problem.noise_mm**2, 0.0)
 
 
 def shrink_steps(
