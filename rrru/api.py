@@ -24,7 +24,6 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from tqdm import tqdm
 
 from rrru.calibration.calibrate import Calibration
 from rrru.diagnosis.diagnose import STEPS
@@ -541,6 +540,8 @@ def _shown(progress: bool | Progress) -> Iterator[Callable[[str], None] | None]:
     elif not progress:
         yield None
     else:
+        from tqdm import tqdm
+
         with tqdm(total=len(STEPS), leave=False) as bar:
 
             def begin(step: str) -> None:

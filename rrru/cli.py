@@ -40,7 +40,19 @@ class _Parser(argparse.ArgumentParser):
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command; returns its exit code."""
+    """Run the command; returns its exit code. arguments: None for those of the process, which then ends with it."""
+    if arguments is not None:
+        return _run(arguments)
+    # little of a command is garbage, but the search for it, and once more as the process ends, takes a tenth of its time
+    gc.disable()
+    try:
+        return _run(sys.argv[1:])
+    finally:
+        gc.freeze()
+
+
+def _run(arguments: Sequence[str]) -> int:
+    """Run the command with arguments; returns its exit code."""
     options = _parser().parse_args(arguments)
     # libraries that compute with several threads give other last digits, and are slower on matrices of this size
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
@@ -239,13 +251,9 @@ def _names(text: str) -> list[str]:
 
 def _diagnose(options: argparse.Namespace) -> int:
     """Read, calibrate and diagnose a campaign; write its results and print the answer."""
-    first = "rrru.api" not in sys.modules
     from rrru import api
     from rrru.figures.files import with_svg
 
-    if first:
-        # modules stay: a garbage collector that looks through them again and again takes a tenth of the time
-        gc.freeze()
     config, name = _stated(options)
     if "robot" not in config["campaigns"][name]:
         known = ", ".join(config["robots"])
