@@ -11,7 +11,8 @@ import os
 import shutil
 import sys
 import textwrap
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -43,7 +44,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; returns its exit code. arguments: None for those of the process, which then ends with it."""
     if arguments is not None:
         return _run(arguments)
-    # little of a command is garbage, but the search for it, and once more as the process ends, takes a tenth of its time
+    # searches for garbage, one of them as the process ends, cost 0.3 s and free little
     gc.disable()
     try:
         return _run(sys.argv[1:])
@@ -258,17 +259,30 @@ def _diagnose(options: argparse.Namespace) -> int:
     if "robot" not in config["campaigns"][name]:
         known = ", ".join(config["robots"])
         raise ConfigError(f"no robot is stated; allowed: --robot with a URDF or MJCF file, or one of {known}")
-    campaign = api.configured_campaign(name, config)
     _require_writable(Path(options.out))
     kinds = with_svg(options.figures)
-    shown = sys.stderr.isatty()
-    diagnosis = api.diagnose(campaign, effects=options.effects, progress=shown)
-    page = diagnosis.write(options.out, kinds)
+    terminal = sys.stderr.isatty()
+    with _during("file", terminal):
+        campaign = api.configured_campaign(name, config)
+    diagnosis = api.diagnose(campaign, effects=options.effects, progress=terminal)
+    with _during("page, tables and figures", terminal):
+        page = diagnosis.write(options.out, kinds)
     if options.json:
         print(page.with_name("verdict.json").read_text(encoding="utf-8"), end="")
     else:
         _print_answer(campaign, page, not options.config)
     return REFUSED if diagnosis.verdict["no_answer"] else DONE
+
+
+@contextmanager
+def _during(step: str, terminal: bool) -> Iterator[None]:
+    """Show the only step of a computation on a terminal while it runs."""
+    from rrru.pipeline.progress import shown
+
+    with shown(terminal, (step,)) as begin:
+        if begin:
+            begin(step)
+        yield
 
 
 def _require_writable(folder: Path) -> None:
@@ -316,7 +330,7 @@ def _check(options: argparse.Namespace) -> int:
     section = config["campaigns"][name]
     if "ingest" not in section:
         raise ConfigError(f"campaign {name} is a virtual one; allowed: a file, or a measured campaign")
-    accepted = print_check(section["ingest"], config, section.get("robot"), None, options.config)
+    accepted = print_check(section["ingest"], config, section.get("robot"), None, options.config, sys.stderr.isatty())
     return DONE if accepted else REFUSED
 
 

@@ -232,6 +232,18 @@ def test_keys_of_a_message_are_options_for_a_user_of_the_command(tmp_path, capsy
     assert message.splitlines()[-1] == "as options of the command: --frame register"
 
 
+@pytest.mark.usefixtures("quick_figures")
+def test_every_slow_step_is_shown_on_a_terminal_only(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    _, _, shown = ran(capsys, "check", "data/field_12.csv", "--robot", "rrru3")
+    assert "columns:" in shown
+    stated = ("diagnose", "data/field_12.csv", "--robot", "rrru3", "--effects", "backlash", "--out", tmp_path)
+    _, _, shown = ran(capsys, *stated)
+    assert all(f"{step}:" in shown for step in ("file", "problem", "page, tables and figures"))
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: False)
+    assert ran(capsys, "check", "data/field_12.csv", "--robot", "rrru3")[2] == ""
+
+
 def test_the_place_of_the_tool_is_an_option_for_a_user_of_the_command():
     said = "allowed: a tool at (85.9, 12, -29.9) mm (the robot's tool_mm), which leaves 0.9 mm rms"
     assert options_in(said) == ["--tool 85.9,12,-29.9"]
