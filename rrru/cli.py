@@ -180,7 +180,7 @@ def _stated(options: argparse.Namespace) -> tuple[dict[str, Any], str]:
         raise ConfigError(f"--commands {options.commands}: {why}; allowed: a file with the commanded positions")
     if section is None:
         name, section = options.name or as_name(Path(options.file).stem), {"ingest": options.file}
-    config, robot = _with_robot(options, config)
+    config, robot = _with_robot(options, config, section.get("robot"))
     section = section | ({"robot": robot} if robot else {}) | _keys(options)
     config = merged(config, {"campaigns": {name: section}})
     if "robot" in section:
@@ -188,16 +188,25 @@ def _stated(options: argparse.Namespace) -> tuple[dict[str, Any], str]:
     return config, name
 
 
-def _with_robot(options: argparse.Namespace, config: dict[str, Any]) -> tuple[dict[str, Any], str | None]:
-    """The configuration with the robot of the arguments, and the robot's name, None where none is stated."""
-    from rrru import api
-    from rrru.pipeline.read_config import merged
+def _with_robot(
+    options: argparse.Namespace, config: dict[str, Any], of_campaign: str | None = None
+) -> tuple[dict[str, Any], str | None]:
+    """The configuration with the robot of the arguments, and the robot's name, None where none is stated.
 
-    if options.robot is None or options.robot in config["robots"]:
-        return config, options.robot
-    of_file = {key: getattr(options, key) for key in _OF_ROBOT}
-    robot = api.load_robot(options.robot, tool_mm=options.tool, up=options.up, **of_file)
-    return merged(config, {"robots": {robot.name: robot.entry}}), robot.name
+    of_campaign: the robot of the configuration that the arguments are about where they name none.
+    """
+    from rrru import api
+    from rrru.pipeline.read_config import check_config, merged
+
+    of_file = {key: getattr(options, key) for key in _OF_ROBOT} | {"tool_mm": options.tool, "up": options.up}
+    stated = {key: value for key, value in of_file.items() if value is not None}
+    if options.robot is not None and options.robot not in config["robots"]:
+        robot = api.load_robot(options.robot, **stated)
+        return merged(config, {"robots": {robot.name: robot.entry}}), robot.name
+    if stated and (name := options.robot or of_campaign):
+        config = merged(config, {"robots": {name: stated}})
+        check_config(config)
+    return config, options.robot
 
 
 def _keys(options: argparse.Namespace) -> dict[str, Any]:
