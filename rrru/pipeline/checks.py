@@ -50,7 +50,7 @@ def check_schema(config: Mapping[str, Any], file: str | Path, parts: bool = Fals
         kind = error.validator_value if error.validator == "type" else None
         allowed = f"; allowed: {_STRICT[kind][1]}" if isinstance(kind, str) and kind in _STRICT else ""
         place = ".".join(map(str, error.absolute_path)) or "configuration"
-        said = _choices(error) or f"{error.message}{allowed}{_as_number(error)}{_meant(error)}"
+        said = _choices(error) or f"{_said(error)}{allowed}{_as_number(error)}{_meant(error)}"
         raise ConfigError(f"{place}: {said}")
 
 
@@ -130,6 +130,13 @@ def _of_its_type(error: "ValidationError") -> "ValidationError":
     """The error of the only alternative that is of the value's type, or the error itself."""
     others = [one for one in error.context or () if one.validator != "type"]
     return _of_its_type(others[0]) if len(others) == 1 else error
+
+
+def _said(error: "ValidationError") -> str:
+    """What is wrong: of a mapping that has keys that are no text only these, since it may be long."""
+    if error.validator_value == "object" and isinstance(error.instance, dict):
+        return f"has the key {', '.join(repr(key) for key in error.instance if not isinstance(key, str))}"
+    return str(error.message)
 
 
 def _choices(error: "ValidationError") -> str:
