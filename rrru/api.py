@@ -15,8 +15,7 @@ wrong with which value, what is allowed, and what to do.
 import html
 import re
 import tempfile
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -24,7 +23,6 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from tqdm import tqdm
 
 from rrru.calibration.calibrate import Calibration
 from rrru.diagnosis.diagnose import STEPS
@@ -49,13 +47,11 @@ from rrru.pipeline.jobs.outputs import (
     READ_TABLES,
     part_path,
 )
+from rrru.pipeline.progress import Progress, shown
 from rrru.pipeline.read_config import check_config, merged, read_config
 from rrru.report import page
 from rrru.store import json_files
 from rrru.store.atomic_write import whole, write_text
-
-# called with the name of a step, its number from 0 on and the number of steps, as the step begins
-Progress = Callable[[str, int, int], None]
 
 
 @dataclass(frozen=True)
@@ -529,25 +525,8 @@ def diagnose(
     check_config(config)
     campaign = Campaign(campaign.name, campaign.robot, config, campaign.frames)
     settings = parts.diagnosis_settings(config, campaign.name, campaign.section)
-    with _shown(progress) as begin:
+    with shown(progress, STEPS) as begin:
         return DiagnosisResult(campaign, diagnose_job.diagnose(settings, campaign.measurements, begin))
-
-
-@contextmanager
-def _shown(progress: bool | Progress) -> Iterator[Callable[[str], None] | None]:
-    """What a diagnosis calls with each step, for `progress` of `diagnose`."""
-    if callable(progress):
-        yield lambda step: progress(step, STEPS.index(step), len(STEPS))
-    elif not progress:
-        yield None
-    else:
-        with tqdm(total=len(STEPS), leave=False) as bar:
-
-            def begin(step: str) -> None:
-                bar.update(STEPS.index(step) - bar.n)
-                bar.set_description(step)
-
-            yield begin
 
 
 def _entry(source: str | Path | Mapping[str, Any], name: str | None) -> tuple[str, dict[str, Any]]:

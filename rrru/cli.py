@@ -11,7 +11,8 @@ import os
 import shutil
 import sys
 import textwrap
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -40,7 +41,19 @@ class _Parser(argparse.ArgumentParser):
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command; returns its exit code."""
+    """Run the command; returns its exit code. arguments: None for those of the process, which then ends with it."""
+    if arguments is not None:
+        return _run(arguments)
+    # searches for garbage, one of them as the process ends, cost 0.3 s and free little
+    gc.disable()
+    try:
+        return _run(sys.argv[1:])
+    finally:
+        gc.freeze()
+
+
+def _run(arguments: Sequence[str]) -> int:
+    """Run the command with arguments; returns its exit code."""
     options = _parser().parse_args(arguments)
     # libraries that compute with several threads give other last digits, and are slower on matrices of this size
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
@@ -167,7 +180,7 @@ def _stated(options: argparse.Namespace) -> tuple[dict[str, Any], str]:
         raise ConfigError(f"--commands {options.commands}: {why}; allowed: a file with the commanded positions")
     if section is None:
         name, section = options.name or as_name(Path(options.file).stem), {"ingest": options.file}
-    config, robot = _with_robot(options, config)
+    config, robot = _with_robot(options, config, section.get("robot"))
     section = section | ({"robot": robot} if robot else {}) | _keys(options)
     config = merged(config, {"campaigns": {name: section}})
     if "robot" in section:
@@ -175,16 +188,25 @@ def _stated(options: argparse.Namespace) -> tuple[dict[str, Any], str]:
     return config, name
 
 
-def _with_robot(options: argparse.Namespace, config: dict[str, Any]) -> tuple[dict[str, Any], str | None]:
-    """The configuration with the robot of the arguments, and the robot's name, None where none is stated."""
-    from rrru import api
-    from rrru.pipeline.read_config import merged
+def _with_robot(
+    options: argparse.Namespace, config: dict[str, Any], of_campaign: str | None = None
+) -> tuple[dict[str, Any], str | None]:
+    """The configuration with the robot of the arguments, and the robot's name, None where none is stated.
 
-    if options.robot is None or options.robot in config["robots"]:
-        return config, options.robot
-    of_file = {key: getattr(options, key) for key in _OF_ROBOT}
-    robot = api.load_robot(options.robot, tool_mm=options.tool, up=options.up, **of_file)
-    return merged(config, {"robots": {robot.name: robot.entry}}), robot.name
+    of_campaign: the robot of the configuration that the arguments are about where they name none.
+    """
+    from rrru import api
+    from rrru.pipeline.read_config import check_config, merged
+
+    of_file = {key: getattr(options, key) for key in _OF_ROBOT} | {"tool_mm": options.tool, "up": options.up}
+    stated = {key: value for key, value in of_file.items() if value is not None}
+    if options.robot is not None and options.robot not in config["robots"]:
+        robot = api.load_robot(options.robot, **stated)
+        return merged(config, {"robots": {robot.name: robot.entry}}), robot.name
+    if stated and (name := options.robot or of_campaign):
+        config = merged(config, {"robots": {name: stated}})
+        check_config(config)
+    return config, options.robot
 
 
 def _keys(options: argparse.Namespace) -> dict[str, Any]:
@@ -239,28 +261,37 @@ def _names(text: str) -> list[str]:
 
 def _diagnose(options: argparse.Namespace) -> int:
     """Read, calibrate and diagnose a campaign; write its results and print the answer."""
-    first = "rrru.api" not in sys.modules
     from rrru import api
     from rrru.figures.files import with_svg
 
-    if first:
-        # modules stay: a garbage collector that looks through them again and again takes a tenth of the time
-        gc.freeze()
     config, name = _stated(options)
     if "robot" not in config["campaigns"][name]:
         known = ", ".join(config["robots"])
         raise ConfigError(f"no robot is stated; allowed: --robot with a URDF or MJCF file, or one of {known}")
-    campaign = api.configured_campaign(name, config)
     _require_writable(Path(options.out))
     kinds = with_svg(options.figures)
-    shown = sys.stderr.isatty()
-    diagnosis = api.diagnose(campaign, effects=options.effects, progress=shown)
-    page = diagnosis.write(options.out, kinds)
+    terminal = sys.stderr.isatty()
+    with _during("file", terminal):
+        campaign = api.configured_campaign(name, config)
+    diagnosis = api.diagnose(campaign, effects=options.effects, progress=terminal)
+    with _during("page, tables and figures", terminal):
+        page = diagnosis.write(options.out, kinds)
     if options.json:
         print(page.with_name("verdict.json").read_text(encoding="utf-8"), end="")
     else:
         _print_answer(campaign, page, not options.config)
     return REFUSED if diagnosis.verdict["no_answer"] else DONE
+
+
+@contextmanager
+def _during(step: str, terminal: bool) -> Iterator[None]:
+    """Show the only step of a computation on a terminal while it runs."""
+    from rrru.pipeline.progress import shown
+
+    with shown(terminal, (step,)) as begin:
+        if begin:
+            begin(step)
+        yield
 
 
 def _require_writable(folder: Path) -> None:
@@ -308,7 +339,7 @@ def _check(options: argparse.Namespace) -> int:
     section = config["campaigns"][name]
     if "ingest" not in section:
         raise ConfigError(f"campaign {name} is a virtual one; allowed: a file, or a measured campaign")
-    accepted = print_check(section["ingest"], config, section.get("robot"), None, options.config)
+    accepted = print_check(section["ingest"], config, section.get("robot"), None, options.config, sys.stderr.isatty())
     return DONE if accepted else REFUSED
 
 

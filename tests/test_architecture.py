@@ -36,7 +36,7 @@ _FLOORS = {
     "__main__": 15,
 }
 # tables in, figures out: they import none of the computing packages
-_APART = {"store": {"errors"}, "figures": {"errors", "store"}}
+_APART = {"store": {"errors"}, "figures": {"arrays", "errors", "store"}}
 _DRAWING = {p.relative_to(_ROOT).as_posix() for p in (_ROOT / "rrru").rglob("*.py") if "figures" in str(p)}
 _LIBRARIES = {
     "pygad": {"rrru/genetic/pygad_run.py"},

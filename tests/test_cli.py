@@ -232,6 +232,37 @@ def test_keys_of_a_message_are_options_for_a_user_of_the_command(tmp_path, capsy
     assert message.splitlines()[-1] == "as options of the command: --frame register"
 
 
+@pytest.mark.usefixtures("quick_figures")
+def test_every_slow_step_is_shown_on_a_terminal_only(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    _, _, shown = ran(capsys, "check", "data/field_12.csv", "--robot", "rrru3")
+    assert "columns:" in shown
+    stated = ("diagnose", "data/field_12.csv", "--robot", "rrru3", "--effects", "backlash", "--out", tmp_path)
+    _, _, shown = ran(capsys, *stated)
+    assert all(f"{step}:" in shown for step in ("file", "problem", "page, tables and figures"))
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: False)
+    assert ran(capsys, "check", "data/field_12.csv", "--robot", "rrru3")[2] == ""
+
+
+@pytest.mark.parametrize(
+    "option", [("--tool", "1,2,3"), ("--up", "0,1,0"), ("--tip", "tool0"), ("--platform", "plate")]
+)
+def test_an_option_about_a_robot_s_file_is_refused_where_the_robot_has_none(capsys, tmp_path, option):
+    """The dimensions of the package's robots are all that there is of them: the option would change nothing."""
+    code, _, message = ran(capsys, "diagnose", "data/field_12.csv", "--robot", "rrru3", *option, "--out", tmp_path)
+    key = {"--tool": "tool_mm"}.get(option[0], option[0][2:])
+    assert code == cli.WRONG and f"robots.rrru3: Additional properties are not allowed ('{key}'" in message
+
+
+def test_an_option_about_a_robot_s_file_holds_for_one_of_a_configuration(capsys, tmp_path):
+    stated = {"robots": {"arm": {"urdf": "data/models/arm6.urdf"}}}
+    stated["campaigns"] = {"mine": {"robot": "arm", "ingest": "data/field_12.csv"}}
+    (tmp_path / "mine.yaml").write_text(yaml.safe_dump(stated), encoding="utf-8")
+    for robot in ((), ("--robot", "arm")):
+        code, _, message = ran(capsys, "check", "mine", *robot, "--tip", "hand", "--config", tmp_path / "mine.yaml")
+        assert code == cli.WRONG and "tip is 'hand'; allowed: base_link, shoulder" in message
+
+
 def test_the_place_of_the_tool_is_an_option_for_a_user_of_the_command():
     said = "allowed: a tool at (85.9, 12, -29.9) mm (the robot's tool_mm), which leaves 0.9 mm rms"
     assert options_in(said) == ["--tool 85.9,12,-29.9"]

@@ -176,6 +176,8 @@ class Weigher:
         self._kinds: dict[str, tuple[float, float]] = {}
         self._legs = {name: len(np.unique(effect.coordinates.legs)) for name, effect in library.items()}
         self._functions = sum(name in UNKNOWN for name in library)
+        known = len(library) - self._functions
+        self._sets = [prior.log_set(count, known) for count in range(known + 1)]
         for name in library.keys() - UNKNOWN.keys():
             kinds = {term.legs if isinstance(term.legs, str) else "one" for term in variants(library[name])}
             coordinates, some = library[name].coordinates, may_be_on_some(library[name]) * OPTIONS.prior_some_legs
@@ -195,7 +197,7 @@ class Weigher:
     def terms(self, terms: Sequence[EffectTerm]) -> float:
         """Logarithm of the prior probability of a set of terms, whatever the discrepancy."""
         known = [term for term in terms if term.effect not in UNKNOWN]
-        total = self._prior.log_set(len(known), len(self._effects))
+        total = self._sets[len(known)]
         total += (len(terms) - len(known)) * np.log(self._prior.unexplained / max(self._functions, 1))
         for term in known:
             total += self._effects[term.effect][term.shape]

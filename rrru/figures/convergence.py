@@ -1,17 +1,21 @@
 """How the genetic algorithm converges, seed by seed, against the optimum of its own objective."""
 
 import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
+from matplotlib.figure import Figure
 
 from rrru.errors import ConfigError
 from rrru.figures import choose, style
+from rrru.figures.choose import Options, Tables
 
 # smallest excess that is drawn, a nanometre: the log axis has no zero, and no smaller difference matters
 _FLOOR_MM = 1e-6
 
 
 @style.printed
-def convergence(tables, options):
+def convergence(tables: Tables, options: Options) -> Figure:
     """Convergence of the genetic algorithm: excess of the best mean distance so far over the least one, for every
     seed, their median and quartiles; a run that has stopped keeps what it reached.
     """
@@ -38,7 +42,7 @@ def convergence(tables, options):
     return figure
 
 
-def _panel(axes, history, optimum):
+def _panel(axes: Axes, history: pd.DataFrame, optimum: float) -> None:
     """Every seed as a thin line, their median and quartiles; a run that has stopped keeps what it reached."""
     wide = history.pivot(index="generation", columns="seed", values="best_mm").sort_index()
     excess = (wide.where(np.isfinite(wide)).ffill() - optimum).clip(lower=_FLOOR_MM)

@@ -1,11 +1,18 @@
 """Every calibration applied to every trajectory."""
 
+from collections.abc import Sequence
+
 import numpy as np
 import pandas as pd
+from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
+from matplotlib.figure import Figure
+from matplotlib.image import AxesImage
 from matplotlib.ticker import LogLocator
 
+from rrru.arrays import FloatArray
 from rrru.figures import choose, style
+from rrru.figures.choose import Options, Tables
 
 _GROUPS = ("all_lines",)
 _NOT_SHOWN = ("all",)
@@ -14,7 +21,7 @@ _SIDE_BY_SIDE = 9
 
 
 @style.printed
-def cross(tables, options):
+def cross(tables: Tables, options: Options) -> Figure:
     """Every calibration applied to every trajectory: (a) mean and (b) largest position error. The first row is
     before any calibration.
     """
@@ -29,8 +36,8 @@ def cross(tables, options):
     single = sorted((name for name in present if name not in _GROUPS), key=choose.natural)
     columns = [*single, *(name for name in _GROUPS if name in present)]
     shown = pd.concat([before, after]).drop_duplicates(["calibration", "trajectory"], keep="last")
-    tables = (shown.pivot(index="calibration", columns="trajectory", values=size) for size in ("mean_mm", "max_mm"))
-    both = [table.reindex(rows)[columns].to_numpy(dtype=float) for table in tables]
+    sizes = (shown.pivot(index="calibration", columns="trajectory", values=size) for size in ("mean_mm", "max_mm"))
+    both = [table.reindex(rows)[columns].to_numpy(dtype=float) for table in sizes]
     side_by_side = len(columns) <= _SIDE_BY_SIDE
     height = 8.0 * len(rows) + 22.0
     figure = style.new(style.DOUBLE_MM, height + 22.0 if side_by_side else 2.0 * height + 14.0)
@@ -50,20 +57,20 @@ def cross(tables, options):
     return figure
 
 
-def _scale(values):
+def _scale(values: FloatArray) -> LogNorm:
     """One log colour scale for all panels."""
     values = values[np.isfinite(values) & (values > 0.0)]
     return LogNorm(values.min(), max(values.max(), values.min() * 1.1)) if values.size else LogNorm(0.1, 1.0)
 
 
-def _panel(axes, matrix, scale, rows, columns):
+def _panel(axes: Axes, matrix: FloatArray, scale: LogNorm, rows: Sequence[str], columns: Sequence[str]) -> AxesImage:
     """Heat map with every number written; lightness alone orders the colours."""
     image = axes.imshow(
         np.ma.masked_invalid(matrix), cmap=style.SEQUENTIAL, norm=scale, aspect="auto", interpolation="none"
     )
     for (row, column), value in np.ndenumerate(matrix):
-        dark = np.isfinite(value) and scale(max(value, scale.vmin)) > 0.6
-        look = {"ha": "center", "va": "center", "fontsize": 7.0, "in_layout": False}
+        dark = np.isfinite(value) and scale(value, clip=True) > 0.6
+        look: style.Look = {"ha": "center", "va": "center", "fontsize": 7.0, "in_layout": False}
         axes.text(column, row, style.number(value), color="white" if dark else "black", **look)
     axes.set_xticks(range(len(columns)), [choose.plain(name) for name in columns], rotation=90)
     axes.set_yticks(range(len(rows)), [name.replace("_", " ") for name in rows])

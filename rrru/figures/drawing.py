@@ -2,14 +2,25 @@
 
 import importlib
 import inspect
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 
+from matplotlib.figure import Figure
+
 from rrru.figures import style
+from rrru.figures.choose import Options, Tables
 from rrru.figures.files import KINDS, fits_page
+from rrru.figures.style import Drawing
 from rrru.store import tables
 
 
-def draw_all(figures, paths, options, outputs, kinds=KINDS):
+def draw_all(
+    figures: Mapping[str, tuple[str, Sequence[str]]],
+    paths: Mapping[str, str],
+    options: Options,
+    outputs: Mapping[str, str],
+    kinds: Collection[str] = KINDS,
+) -> None:
     """Draw figures {name: ("module:function", names of its tables)} to outputs["{name}_{kind}"] of `KINDS`.
 
     paths: the tables' paths by name; options: of all figures, see their functions; kinds: of the files, "svg" among
@@ -19,7 +30,7 @@ def draw_all(figures, paths, options, outputs, kinds=KINDS):
     for name, (place, needed) in figures.items():
         figure = draw(place, {table: tables.read(paths[table]) for table in needed}, options)
         files = {kind: outputs[f"{name}_{kind}"] for kind in KINDS}
-        caption = inspect.cleandoc(_function(place).__doc__)
+        caption = inspect.cleandoc(_function(place).__doc__ or "")
         style.save(figure, {kind: files[kind] for kind in kinds}, caption)
         others = set(KINDS) - set(kinds)
         if "png" in others and not fits_page(files["svg"]):
@@ -29,12 +40,13 @@ def draw_all(figures, paths, options, outputs, kinds=KINDS):
             Path(files[kind]).unlink(missing_ok=True)
 
 
-def draw(place, frames, options):
+def draw(place: str, frames: Tables, options: Options) -> Figure:
     """The figure of a function "module:function" for frames by table name."""
     return _function(place)(frames, options)
 
 
-def _function(place):
+def _function(place: str) -> Drawing:
     """The function that "module:function" names."""
     module, _, name = place.partition(":")
-    return getattr(importlib.import_module(module), name)
+    function: Drawing = getattr(importlib.import_module(module), name)
+    return function

@@ -1,18 +1,22 @@
 """Errors of the drives over their own values."""
 
 import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from rrru.figures import choose, style
+from rrru.figures.choose import Options, Tables
 
 # the table's units as they are drawn: of the drive's value and of its error, with factors
 _VALUES = {"rad": ("degrees", 180.0 / np.pi), "mm": ("mm", 1.0)}
 _ERRORS = {"rad": ("mrad", 1e3), "mm": ("µm", 1e3)}
 _SHORT = {"degrees": "°", "mm": " mm"}
-_WORST = {"marker": "o", "markersize": 9.0, "markerfacecolor": "none", "markeredgewidth": 1.2}
+_WORST: style.Look = {"marker": "o", "markersize": 9.0, "markerfacecolor": "none", "markeredgewidth": 1.2}
 
 
 @style.printed
-def drive_functions(tables, options):
+def drive_functions(tables: Tables, options: Options) -> Figure:
     """Errors of the drives over their own values, as the named effects make them, over the range that was measured and
     minus their mean there: a constant is the drive's zero. Band: 95 % interval. Ring: where the error is largest.
     """
@@ -28,12 +32,12 @@ def drive_functions(tables, options):
     return figure
 
 
-def _mark(number):
+def _mark(number: int) -> str:
     """Mark of a panel: a to z, then with its number."""
     return chr(97 + number) if number < 26 else f"{number + 1}"
 
 
-def _panel(axes, part):
+def _panel(axes: Axes, part: pd.DataFrame) -> None:
     """Error of one drive with its band, and the ring at its largest."""
     unit = part["unit"].iloc[0]
     (value_unit, value_factor), (error_unit, error_factor) = _VALUES[unit], _ERRORS[unit]
@@ -48,7 +52,7 @@ def _panel(axes, part):
     text = f"{style.number(size)} {error_unit} at {style.number(at)}{_SHORT[value_unit]}"
     side = "right" if at > value.mean() else "left"
     beyond = 8.0 if size > 0.0 else -8.0
-    look = {"color": style.VERMILION, "fontsize": 7.0, "ha": side, "va": "bottom" if size > 0.0 else "top"}
+    look: style.Look = {"color": style.VERMILION, "fontsize": 7.0, "ha": side, "va": "bottom" if size > 0.0 else "top"}
     axes.annotate(text, (at, size), xytext=(0.0, beyond), textcoords="offset points", in_layout=False, **look)
     axes.margins(x=0.02, y=0.3)
     axes.set_xlabel(f"drive value, {part['name'].iloc[0]} ({value_unit})")

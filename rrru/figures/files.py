@@ -5,7 +5,12 @@ from pathlib import Path
 
 from rrru.errors import ConfigError
 
-KINDS = ("pdf", "png", "svg")
+# kinds of files: the entry that would hold a date or a version, and the one for the caption
+KINDS = {
+    "pdf": ("CreationDate", "Subject"),
+    "png": ("Software", "Description"),
+    "svg": ("Date", "Description"),
+}
 # bytes of the largest SVG that a page holds; of a larger figure it shows the PNG
 LARGEST_SVG = 400_000
 

@@ -5,19 +5,31 @@ with the intervals of its parts.
 """
 
 import re
+from collections.abc import Iterable, Sequence
 from textwrap import wrap
+from typing import TypeAlias, TypedDict
 
 import numpy as np
+import pandas as pd
 from matplotlib import colormaps
+from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap, Normalize
+from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.quiver import Quiver
 from matplotlib.ticker import MaxNLocator
 
+from rrru.arrays import FloatArray
 from rrru.errors import ConfigError
 from rrru.figures import choose, style
+from rrru.figures.choose import Options, Tables
 
-_BEFORE = {"color": "#777777", "marker": "o", "markerfacecolor": "white"}
-_AFTER = {"color": style.BLUE, "marker": "s"}
+# axes by the name of their panel; lower and upper end of a bar
+Panels: TypeAlias = dict[str, Axes]
+_Limits: TypeAlias = tuple[float, float]
+
+_BEFORE: style.Look = {"color": "#777777", "marker": "o", "markerfacecolor": "white"}
+_AFTER: style.Look = {"color": style.BLUE, "marker": "s"}
 _NOISE = style.TOLERANCE
 # rows below the library's effects
 _APART = ("none", "unexplained")
@@ -50,8 +62,14 @@ _ARROW_SHARE, _LARGEST_PERCENT = 0.08, 99.0
 _MARGIN = 0.03
 # points of a path are nearer to each other than this share of the workspace
 _PATH_SHARE = 0.2
-_ARROW = {"width": 0.0035, "headwidth": 3.5, "headlength": 4.0, "headaxislength": 3.5}
-_RING = {"color": style.VERMILION, "marker": "o", "markersize": 9.0, "markerfacecolor": "none", "markeredgewidth": 1.4}
+_ARROW: style.Look = {"width": 0.0035, "headwidth": 3.5, "headlength": 4.0, "headaxislength": 3.5}
+_RING: style.Look = {
+    "color": style.VERMILION,
+    "marker": "o",
+    "markersize": 9.0,
+    "markerfacecolor": "none",
+    "markeredgewidth": 1.4,
+}
 
 # parts of the budget by kind
 _KIND_COLOURS = {"scatter": "#aaaaaa", "runs": "#cccccc", "unexplained": "#d55e00", "calibration": "#eeeeee"}
@@ -64,8 +82,15 @@ _LEAST_PART, _NAMED_PART, _LETTER_SHARE = 0.01, 0.03, 0.0125
 _NAME_HEIGHTS = (0.34, -0.36)
 
 
+class _DriveNames(TypedDict):
+    """Names of the robot's drives, and the word for one of them."""
+
+    drives: Sequence[str]
+    noun: str
+
+
 @style.printed
-def gap(tables, options):
+def gap(tables: Tables, options: Options) -> Figure:
     """The gap between the calibrated model and the measurement. On top its budget: the share of its mean square that
     each effect makes, that does not repeat, and that nothing explains, with 95 % intervals as thin lines; covariances
     of confounded parts (hatched) and the sampling of the noise (dotted) complete them to 1. The probability in the
@@ -79,7 +104,7 @@ def gap(tables, options):
     for name in ("gap_verdicts", "gap_attribute", "gap_shrink", "gap_budget"):
         frames[name] = choose.of_campaign(tables, name, campaign, "gap")
     verdict, causes, shrink = frames["gap_verdicts"].iloc[0], _ordered(frames["gap_attribute"]), frames["gap_shrink"]
-    words = {"drives": options["drives"], "noun": options["drive_noun"]}
+    words: _DriveNames = {"drives": options["drives"], "noun": options["drive_noun"]}
     points, headline = _sized(tables["gap_points"], campaign), _headline(verdict, causes, words)
     used = points[points["used"]]
     figure, panels = _page(sum(map(len, headline)), len(causes), len(_rows_of(shrink["trajectory"])), used)
@@ -94,7 +119,7 @@ def gap(tables, options):
 
 
 @style.printed
-def gap_map(tables, options):
+def gap_map(tables: Tables, options: Options) -> Figure:
     """Residual errors: measured minus calibrated model at the points, from above and from the side. An arrow
     points to where the robot really was, magnified as stated; dark is far. The ring is where the mean over neighbouring
     points is largest.
@@ -113,17 +138,17 @@ def gap_map(tables, options):
     return figure
 
 
-def _map(figure, panels, used, verdict, z_down, mark=""):
+def _map(figure: Figure, panels: Panels, used: pd.DataFrame, verdict: pd.Series, z_down: bool, mark: str = "") -> None:
     """Both views of the gap with the scale of their arrows."""
     worst = verdict[[f"worst_{axis}_mm" for axis in "xyz"]].to_numpy(dtype=float)
     arrows, beyond, factor = _draw_arrows(panels, used, worst, z_down)
     panels["top view"].set_title(f"{mark}gap, magnified {factor:g} times; ring: worst region")
-    place = {"location": "bottom", "aspect": 40, "fraction": 0.08, "extend": "max" if beyond else "neither"}
+    place: style.Look = {"location": "bottom", "aspect": 40, "fraction": 0.08, "extend": "max" if beyond else "neither"}
     bar = figure.colorbar(arrows, ax=panels["side view"], ticks=MaxNLocator(_TICKS), **place)
     bar.set_label("measured minus calibrated model (mm)")
 
 
-def _sized(points, campaign):
+def _sized(points: pd.DataFrame, campaign: str) -> pd.DataFrame:
     """Points in the order driven with the sizes of both residuals; raises ConfigError where none is used."""
     if not points["used"].any():
         raise ConfigError(f"gap: campaign {campaign!r} has no point that the diagnosis used")
@@ -133,7 +158,7 @@ def _sized(points, campaign):
     return points.sort_values(["run", "point"], kind="stable").reset_index(drop=True)
 
 
-def _page(lines, causes, trajectories, used):
+def _page(lines: int, causes: int, trajectories: int, used: pd.DataFrame) -> tuple[Figure, Panels]:
     """A figure that is as high as its panels need, and these by name, empty."""
     rows = [_ROW_MM * causes, _ROW_MM * trajectories]
     views = [_MAP_MM * _height_ratio(used, name) for name in _VIEWS]
@@ -143,15 +168,15 @@ def _page(lines, causes, trajectories, used):
     figure = style.new(style.DOUBLE_MM, sum(heights) + others[3])
     outer = figure.add_gridspec(4, 1, height_ratios=heights)
     sides = outer[2].subgridspec(1, 2, width_ratios=[1.0, 1.0])
-    left, right = (side.subgridspec(2, 1, height_ratios=size) for side, size in zip(sides, (views, rows), strict=True))
+    left, right = (side.subgridspec(2, 1, height_ratios=size) for side, size in ((sides[0], views), (sides[1], rows)))
     names = ("headline", "budget", *_VIEWS, "causes", "shrink", "along")
-    places = (outer[0], outer[1], *left, *right, outer[3])
+    places = (outer[0], outer[1], left[0], left[1], right[0], right[1], outer[3])
     panels = {name: figure.add_subplot(place) for name, place in zip(names, places, strict=True)}
     panels["top view"].sharex(panels["side view"])
     return figure, panels
 
 
-def _headline(verdict, causes, words):
+def _headline(verdict: pd.Series, causes: pd.DataFrame, words: _DriveNames) -> tuple[list[str], list[str]]:
     """Lines of the verdict itself, and of its facts and the next step."""
     groups = {names.split(" | ")[0]: names.replace(" | ", " or ") for names in verdict["groups"].split("; ")}
     name = _named("+".join(groups.get(one, one) for one in verdict["effects"].split("+")))
@@ -179,23 +204,23 @@ def _headline(verdict, causes, words):
     return [line.replace(_JOINT, " ") for line in wrap(joined, int(0.8 * _WIDE))], follow
 
 
-def _write(axes, headline):
+def _write(axes: Axes, headline: tuple[list[str], list[str]]) -> None:
     """The headline, the verdict in bold."""
     axes.set_axis_off()
-    looks = {"fontsize": 8.5, "fontweight": "bold"}, {"fontsize": 7.5}
+    looks: tuple[style.Look, ...] = ({"fontsize": 8.5, "fontweight": "bold"}, {"fontsize": 7.5})
     lines = [(line, look) for part, look in zip(headline, looks, strict=True) for line in part]
     for row, (line, look) in enumerate(lines):
-        place = {"transform": axes.transAxes, "ha": "left", "va": "top", "in_layout": False}
+        place: style.Look = {"transform": axes.transAxes, "ha": "left", "va": "top", "in_layout": False}
         axes.text(0.0, 1.0 - row / len(lines), line, **look, **place)
 
 
-def _ordered(causes):
+def _ordered(causes: pd.DataFrame) -> pd.DataFrame:
     """Effects from the most probable on, none and unexplained below them."""
     apart = causes["effect"].isin(_APART)
     return causes.assign(apart=apart).sort_values(["apart", "probability", "effect"], ascending=[True, False, True])
 
 
-def _leg(legs, drives, noun):
+def _leg(legs: str, drives: Sequence[str], noun: str) -> str:
     """Legs of an effect in words; drives: names of the robot's drives; noun: the word for one of them."""
     words = {"each": f"each {noun}", "same": f"all {noun}s alike", "": ""}
     if legs in words:
@@ -204,13 +229,13 @@ def _leg(legs, drives, noun):
     return ", ".join(drives[leg - 1] if leg <= len(drives) else f"{noun} {leg}" for leg in numbers)
 
 
-def _causes(axes, causes, verdict, words):
+def _causes(axes: Axes, causes: pd.DataFrame, verdict: pd.Series, words: _DriveNames) -> None:
     """Probability of every effect; those of the verdict in colour, with their legs."""
     rows = np.arange(len(causes)) + 0.5 * causes["apart"].to_numpy()
     chosen = causes["effect"].isin(verdict["effects"].split("+")).to_numpy()
     alike = (causes["decision"] == "group").to_numpy()
     value = causes["probability"].to_numpy()
-    hatched = {"facecolor": "white", "edgecolor": style.BLUE, "hatch": "/////", "linewidth": 0.6}
+    hatched: style.Look = {"facecolor": "white", "edgecolor": style.BLUE, "hatch": "/////", "linewidth": 0.6}
     axes.barh(rows, np.nan_to_num(value), height=0.72, color=np.where(chosen, style.BLUE, "#bbbbbb"))
     axes.barh(rows[alike], value[alike], height=0.72, **hatched)
     for row, named, cause in zip(rows, chosen, causes.to_dict("records"), strict=True):
@@ -219,7 +244,7 @@ def _causes(axes, causes, verdict, words):
         if cause["decision"] == _NOT_TESTED:
             probability, text = 0.0, _NOT_TESTED
         inside = probability >= _INSIDE_FROM
-        look = {"ha": "right" if inside else "left", "va": "center", "fontsize": 7.0, "in_layout": False}
+        look: style.Look = {"ha": "right" if inside else "left", "va": "center", "fontsize": 7.0, "in_layout": False}
         colour = "white" if inside and named and cause["decision"] != "group" else "black"
         axes.text(probability + (-0.015 if inside else 0.015), row, text, color=colour, **look)
     axes.set_yticks(rows, [_named(name) for name in causes["effect"]])
@@ -229,7 +254,7 @@ def _causes(axes, causes, verdict, words):
     axes.grid(True, axis="x")
 
 
-def _shrink(axes, shrink, verdict):
+def _shrink(axes: Axes, shrink: pd.DataFrame, verdict: pd.Series) -> None:
     """Gap of every trajectory before and after, and the noise, with the explained fraction as a number."""
     kind = next(name for name in _KINDS if (shrink["kind"] == name).any())
     rows = shrink[shrink["kind"] == kind]
@@ -243,7 +268,13 @@ def _shrink(axes, shrink, verdict):
     if rows["step"].max():
         axes.plot(values[1], place, linestyle="none", **_AFTER)
         axes.secondary_yaxis("right").set_yticks(place, [_share(row) for _, row in last.reindex(names).iterrows()])
-        above = {"transform": axes.transAxes, "ha": "left", "va": "bottom", "fontsize": 7.0, "in_layout": False}
+        above: style.Look = {
+            "transform": axes.transAxes,
+            "ha": "left",
+            "va": "bottom",
+            "fontsize": 7.0,
+            "in_layout": False,
+        }
         axes.text(1.05, 1.035, "explained (95 %)", **above)
     axes.set_yticks(place, ["all" if name == "*" else choose.plain(name) for name in names])
     most = 1.08 * np.nanmax([*np.concatenate(values), verdict["noise_rms_mm"]])
@@ -254,13 +285,13 @@ def _shrink(axes, shrink, verdict):
     axes.grid(True, axis="x")
 
 
-def _rows_of(trajectories):
+def _rows_of(trajectories: Iterable[str]) -> list[str]:
     """Names of the rows of panel (c): all points, "*", then each trajectory where there are several."""
     names = sorted(set(trajectories), key=lambda name: (name != "*", choose.natural(name)))
     return names if len(names) > 2 else names[:1]
 
 
-def _along(axes, points, verdict):
+def _along(axes: Axes, points: pd.DataFrame, verdict: pd.Series) -> None:
     """Residual of every point in the order driven, before and after; runs shaded in turn, points left out crossed."""
     used, noise_mm = points["used"].to_numpy(dtype=bool), verdict["noise_rms_mm"]
     top = 1.15 * np.nanmax([*points.loc[used, ["before_mm", "after_mm"]].to_numpy().ravel(), noise_mm])
@@ -283,11 +314,11 @@ def _along(axes, points, verdict):
     axes.set_xticks(middles[::step], labels[::step])
     axes.set(xlim=(-0.5, len(points) - 0.5), ylim=(0.0, top), xlabel="run, in the order driven", ylabel="residual (mm)")
     axes.set_title("(d) residual along the runs")
-    place = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0), "ncols": 4, "borderaxespad": 0.1}
+    place: style.Look = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0), "ncols": 4, "borderaxespad": 0.1}
     axes.legend(handles=_legend(points["after_mm"].notna().any(), not used.all()), **place)
 
 
-def _legend(corrected, left_out):
+def _legend(corrected: bool, left_out: bool) -> list[Line2D]:
     """What marks and lines of the lower panels are."""
     handles = [Line2D([], [], linestyle="-", label="calibrated model", **_BEFORE)]
     if corrected:
@@ -298,17 +329,17 @@ def _legend(corrected, left_out):
     return handles
 
 
-def _named(effects):
+def _named(effects: str) -> str:
     """Names of effects for reading."""
     return effects.replace("_", " ").replace("+", " + ")
 
 
-def _probability(value, equals="", space=""):
+def _probability(value: float, equals: str = "", space: str = "") -> str:
     """A probability to two digits that claims no certainty."""
     return f">{space}0.99" if value > 0.995 else f"<{space}0.01" if value < 0.005 else f"{equals}{value:.2f}"
 
 
-def _share(row, words=""):
+def _share(row: pd.Series, words: str = "") -> str:
     """Explained fraction with its interval in per cent; a dash where there is none."""
     shares = [row[f"share_closed{end}"] for end in ("", "_low", "_high")]
     if not np.isfinite(shares[0]):
@@ -321,18 +352,20 @@ def _share(row, words=""):
     return f"{value} %{words} ({'95 %: ' if words else ''}{low} to {high})"
 
 
-def _shades():
+def _shades() -> ListedColormap:
     """Colours of the arrows: viridis without its light end, dark for large gaps."""
     return ListedColormap(colormaps[style.MEASURE](np.linspace(0.85, 0.0, 256)))
 
 
-def _height_ratio(points, view):
+def _height_ratio(points: pd.DataFrame, view: str) -> float:
     """Height over width of a view."""
     low, high = _limits(points, _VIEWS[view])
-    return max((high[1] - low[1]) / (high[0] - low[0]), 0.3)
+    return float(max((high[1] - low[1]) / (high[0] - low[0]), 0.3))
 
 
-def _draw_arrows(panels, points, worst, z_down=True):
+def _draw_arrows(
+    panels: Panels, points: pd.DataFrame, worst: FloatArray, z_down: bool = True
+) -> tuple[Quiver, bool, float]:
     """Draw both views into axes by name.
 
     Returns the arrows, whether some are larger than the scale holds, and how much they are magnified.
@@ -340,19 +373,20 @@ def _draw_arrows(panels, points, worst, z_down=True):
     points: rows of gap_points that are used, with `before_mm`; worst (3,); z_down: the robot frame's z points down.
     """
     size = points["before_mm"].to_numpy()
-    scale = Normalize(0.0, max(np.percentile(size, _LARGEST_PERCENT), 1e-9) if len(size) else 1.0)
+    largest = max(float(np.percentile(size, _LARGEST_PERCENT)), 1e-9) if len(size) else 1.0
+    scale = Normalize(0.0, largest)
     span = max(np.ptp(points[f"command_{axis}_mm"]) for axis in "xyz")
-    factor = style.magnification(np.array([scale.vmax]), span, _ARROW_SHARE)
+    factor = style.magnification(np.array([largest]), span, _ARROW_SHARE)
     shown = _thinned(points)
     for name, plane in _VIEWS.items():
         arrows = _view(panels[name], points, shown, plane, scale, factor, z_down)
         panels[name].plot(*worst[["xyz".index(axis) for axis in plane]], linestyle="none", zorder=6, **_RING)
     panels["top view"].tick_params(labelbottom=False)
     panels["side view"].set_xlabel("x (mm)")
-    return arrows, bool((size > scale.vmax * (1.0 + 1e-9)).any()), factor
+    return arrows, bool((size > largest * (1.0 + 1e-9)).any()), factor
 
 
-def _fit_views(figure, panels, points):
+def _fit_views(figure: Figure, panels: Panels, points: pd.DataFrame) -> None:
     """Widen the views where the page is too low for them, so that both hold all points."""
     engine, needed = figure.get_layout_engine(), []
     style.arrange(figure)
@@ -366,7 +400,15 @@ def _fit_views(figure, panels, points):
         panels["side view"].set_xlim(0.5 * ((high + low)[0] + widen * (high - low)[0] * np.array([-1.0, 1.0])))
 
 
-def _view(axes, points, shown, plane, scale, factor, z_down):
+def _view(
+    axes: Axes,
+    points: pd.DataFrame,
+    shown: pd.DataFrame,
+    plane: tuple[str, str],
+    scale: Normalize,
+    factor: float,
+    z_down: bool,
+) -> Quiver:
     """One view: the paths as grey lines, the gap's part in the plane as arrows coloured by its size in space.
 
     Lines between poses in no order would show nothing and hide the arrows.
@@ -379,7 +421,7 @@ def _view(axes, points, shown, plane, scale, factor, z_down):
         if len(steps) and np.median(steps) < _PATH_SHARE * span:
             axes.plot(run[across], run[up], color="#cccccc", linewidth=0.5, zorder=1)
     columns = (across, up, *(f"before_{axis}_mm" for axis in plane), "before_mm")
-    size = {"angles": "xy", "scale_units": "xy", "scale": 1.0 / factor, "cmap": _shades(), "norm": scale}
+    size: style.Look = {"angles": "xy", "scale_units": "xy", "scale": 1.0 / factor, "cmap": _shades(), "norm": scale}
     arrows = axes.quiver(*shown[list(columns)].to_numpy().T, **size, **_ARROW, zorder=3)
     low, high = _limits(points, plane)
     # the views share x, so that what is left of a panel's height widens y
@@ -393,7 +435,7 @@ def _view(axes, points, shown, plane, scale, factor, z_down):
     return arrows
 
 
-def _limits(points, plane):
+def _limits(points: pd.DataFrame, plane: tuple[str, str]) -> tuple[FloatArray, FloatArray]:
     """Lower and upper corner (2,) of a view, with a margin for the arrows."""
     place = points[[f"command_{axis}_mm" for axis in plane]].to_numpy(dtype=float)
     span = max(np.ptp(points[f"command_{axis}_mm"]) for axis in "xyz") if len(points) else 1.0
@@ -401,14 +443,14 @@ def _limits(points, plane):
     return (place.min(axis=0) - margin, place.max(axis=0) + margin) if len(place) else (np.zeros(2), np.ones(2))
 
 
-def _thinned(points):
+def _thinned(points: pd.DataFrame) -> pd.DataFrame:
     """Every n-th point of each run, large gaps last so that they lie on top."""
     step = max(-(-len(points) // _MOST_ARROWS), 1)
     place = points.groupby("run", sort=False).cumcount()
     return points[place % step == 0].sort_values("before_mm", kind="stable")
 
 
-def draw_budget(axes, rows):
+def draw_budget(axes: Axes, rows: pd.DataFrame) -> None:
     """Parts of `gap_budget` one after the other: effects by share, then what does not repeat, runs and the unknown.
 
     A thin line in each part is its 95 % interval, counted from the part's beginning. Covariances of parts (hatched) and
@@ -444,12 +486,12 @@ def draw_budget(axes, rows):
         axes.spines[side].set_visible(False)
 
 
-def _width(text, limits):
+def _width(text: str, limits: _Limits) -> float:
     """Width of a text over a bar between limits, in shares."""
     return _LETTER_SHARE * len(text) * (limits[1] - limits[0])
 
 
-def _name(axes, text, middle, limits, taken):
+def _name(axes: Axes, text: str, middle: float, limits: _Limits, taken: dict[float, float]) -> None:
     """Write the name of a part above or below its middle, where no other one is, within the limits of the bar."""
     width = _width(text, limits)
     wanted = max(min(middle - 0.5 * width, limits[1] - width), limits[0])
@@ -459,13 +501,13 @@ def _name(axes, text, middle, limits, taken):
     axes.text(left, height, text, ha="left", va="bottom" if height > 0.0 else "top", fontsize=7.0, in_layout=False)
 
 
-def _rests(axes, shares, start, limits, taken):
+def _rests(axes: Axes, shares: pd.Series, start: float, limits: _Limits, taken: dict[float, float]) -> float:
     """Draw covariances and sampling of one sign, shares by kind, as one part each from `start` on; returns the end."""
     for kind in _RESTS:
         share = float(shares.get(kind, 0.0))
         if abs(share) <= _LEAST_PART:
             continue
-        look = {"facecolor": "white", "edgecolor": "#777777", "hatch": _RESTS[kind], "linewidth": 0.6}
+        look: style.Look = {"facecolor": "white", "edgecolor": "#777777", "hatch": _RESTS[kind], "linewidth": 0.6}
         axes.barh(0.0, share, left=start, height=0.6, **look)
         if abs(share) > _NAMED_PART:
             text = f"{kind} {100.0 * share:.0f} %".replace("-", "\N{MINUS SIGN}")

@@ -3,9 +3,14 @@
 from textwrap import fill
 
 import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.image import AxesImage
 from matplotlib.ticker import LogLocator
 
 from rrru.figures import choose, style
+from rrru.figures.choose import Options, Tables
 
 # weights smaller than this are left unwritten
 _WRITTEN_FROM = 0.15
@@ -22,7 +27,7 @@ _ROW_MM, _SMALL = 2.8, 6.0
 
 
 @style.printed
-def observability(tables, options):
+def observability(tables: Tables, options: Options) -> Figure:
     """Observability by every set of trajectories: directions of parameter space from the best seen to the worst. Each
     has its weights (those below 0.15, or of more than nine parameters, are not written), the half width of the 95 %
     interval along it, and its singular value.
@@ -48,7 +53,7 @@ def observability(tables, options):
     return figure
 
 
-def _weights(axes, part):
+def _weights(axes: Axes, part: pd.DataFrame) -> AxesImage:
     """Heat map of the weights' sizes, lightness alone, with the signed numbers written where they count."""
     parameters = list(dict.fromkeys(part["parameter"]))
     table = part.pivot(index="direction", columns="parameter", values="weight")[parameters].sort_index()
@@ -58,15 +63,16 @@ def _weights(axes, part):
             text = f"{weight:+.2f}".replace("0.", ".", 1).replace("-", "\N{MINUS SIGN}")
             color = "white" if abs(weight) > 0.6 else "black"
             axes.text(column, row, text, ha="center", va="center", fontsize=7.0, color=color, in_layout=False)
-    crowded = {"rotation": 90.0, "fontsize": _SMALL} if len(parameters) > _ROOM_FOR else {}
+    crowded: style.Look = {"rotation": 90.0, "fontsize": _SMALL} if len(parameters) > _ROOM_FOR else {}
+    small: style.Look = {"fontsize": _SMALL} if crowded else {}
     axes.set_xticks(range(len(parameters)), [choose.PARAMETER_LABELS.get(name, name) for name in parameters], **crowded)
-    axes.set_yticks(range(len(table)), table.index, **({"fontsize": _SMALL} if crowded else {}))
+    axes.set_yticks(range(len(table)), table.index, **small)
     axes.tick_params(length=0.0)
     axes.set_xlabel("error parameter")
     return image
 
 
-def _errors(axes, part, limits):
+def _errors(axes: Axes, part: pd.DataFrame, limits: tuple[float, float]) -> None:
     """Half width of the 95 % interval along each direction on a log axis, the singular value as a number next to it."""
     directions = part.drop_duplicates("direction").set_index("direction").sort_index()
     rows = np.arange(len(directions))
@@ -76,7 +82,7 @@ def _errors(axes, part, limits):
     for row in rows[~seen]:
         axes.text(0.5, row, "not seen", transform=axes.get_yaxis_transform(), ha="center", va="center", fontsize=7.0)
     axes.set(xscale="log", xlim=limits, ylim=(len(directions) - 0.5, -0.5))
-    many = {"fontsize": _SMALL} if len(rows) > _ROOM_FOR else {}
+    many: style.Look = {"fontsize": _SMALL} if len(rows) > _ROOM_FOR else {}
     axes.set_yticks(rows, [_short(value) for value in directions["singular_value"]], **many)
     axes.yaxis.tick_right()
     axes.xaxis.set_major_locator(LogLocator(numticks=3))
@@ -87,7 +93,7 @@ def _errors(axes, part, limits):
     axes.grid(True, axis="x")
 
 
-def _error_limits(errors):
+def _error_limits(errors: pd.Series) -> tuple[float, float]:
     """Common limits of all panels' half widths, whole decades."""
     finite = errors[np.isfinite(errors) & (errors > 0.0)]
     if finite.empty:
@@ -96,6 +102,6 @@ def _error_limits(errors):
     return 10.0**low, 10.0 ** max(high, low + 1.0)
 
 
-def _short(value):
+def _short(value: float) -> str:
     """Two digits of a number, or all before the point."""
     return f"{value:.2g}" if 1e-3 <= value < 10.0 else f"{value:.0f}" if value >= 10.0 else f"{value:.0e}"

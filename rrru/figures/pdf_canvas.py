@@ -2,7 +2,7 @@
 
 from types import SimpleNamespace
 
-from fontTools.ttLib import registerCustomTableClass
+from fontTools.ttLib import TTFont, registerCustomTableClass
 from fontTools.ttLib.tables.otBase import BaseTTXConverter
 from matplotlib.backends.backend_pdf import FigureCanvasPdf
 
@@ -13,14 +13,14 @@ __all__ = ["FigureCanvasPdf"]
 _LAYOUT_TABLES = ("GDEF", "GPOS", "GSUB")
 
 
-class UnusedTable(BaseTTXConverter):
+class UnusedTable(BaseTTXConverter):  # type: ignore[misc]
     """A layout table that a subset of its font, embedded in a PDF, goes without."""
 
-    def decompile(self, _data, _font):
+    def decompile(self, _data: bytes, _font: TTFont) -> None:
         """Read nothing: fontTools looks at the version and at `LookupList` of every layout table before it prunes."""
         self.table = SimpleNamespace(Version=0)
 
-    def prune_pre_subset(self, _font, _options):
+    def prune_pre_subset(self, _font: TTFont, _options: object) -> bool:
         """Whether fontTools keeps the table in a subset: never."""
         return False
 

@@ -1,16 +1,21 @@
 """Robots as round bars and discs, seen from one side and a little above."""
 
 import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 
+from rrru.arrays import FloatArray
 from rrru.figures import style
+from rrru.figures.choose import Options, Tables
 
 _AZIMUTH, _ELEVATION = np.radians(-60.0), np.radians(18.0)
 _CORNERS = 24
 
 
 @style.printed
-def solids(tables, _options):
+def solids(tables: Tables, _options: Options) -> Figure:
     """The robots that MuJoCo simulates, in their home poses; lengths in mm."""
     rows = tables["solids"]
     names = list(rows["model"].unique())
@@ -21,7 +26,7 @@ def solids(tables, _options):
     return figure
 
 
-def _draw(axes, rows):
+def _draw(axes: Axes, rows: pd.DataFrame) -> None:
     """The solids of one robot, the farthest first, and a bar of 200 mm."""
     right = np.array([-np.sin(_AZIMUTH), np.cos(_AZIMUTH), 0.0])
     near = np.array([np.cos(_ELEVATION) * np.cos(_AZIMUTH), np.cos(_ELEVATION) * np.sin(_AZIMUTH), np.sin(_ELEVATION)])
@@ -38,7 +43,7 @@ def _draw(axes, rows):
     axes.set_axis_off()
 
 
-def _outline(ends, radius, view):
+def _outline(ends: FloatArray, radius: float, view: FloatArray) -> FloatArray:
     """Outline (k, 2) of a round bar between ends (2, 3) as seen: the hull of both its circles."""
     from scipy.spatial import ConvexHull
 
@@ -47,4 +52,5 @@ def _outline(ends, radius, view):
     angle = np.linspace(0.0, 2.0 * np.pi, _CORNERS, endpoint=False)[:, None]
     circle = radius * (np.cos(angle) * frame[1] + np.sin(angle) * frame[2])
     seen = np.concatenate([end + circle for end in ends]) @ view[:2].T
-    return seen[ConvexHull(seen).vertices]
+    outline: FloatArray = seen[ConvexHull(seen).vertices]
+    return outline

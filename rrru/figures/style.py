@@ -4,16 +4,33 @@ Colours are Okabe and Ito's, which every kind of colour vision can distinguish; 
 in grey and in marker.
 """
 
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import wraps
 from textwrap import fill
+from typing import Any, TypeAlias
 
 import numpy as np
+import numpy.typing as npt
 from matplotlib import style
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.axis import Axis
+from matplotlib.backend_bases import FigureCanvasBase
 from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
+from rrru.figures.choose import Options, Tables
+from rrru.figures.files import KINDS
 from rrru.store.atomic_write import whole
+
+# a figure function: the tables that it draws by name, and the options of all figures
+Drawing: TypeAlias = Callable[[Tables, Options], Figure]
+# axes as `Figure.subplots` arranges them
+AxesArray: TypeAlias = npt.NDArray[Any]
+# keywords of an artist
+Look: TypeAlias = dict[str, Any]
 
 SINGLE_MM, DOUBLE_MM = 85.0, 175.0
 _MM_PER_INCH = 25.4
@@ -24,12 +41,12 @@ _NARROW = 24
 # Okabe and Ito, "Color universal design", 2008
 BLACK, ORANGE, SKY, BLUE, VERMILION, GREY = "#000000", "#E69F00", "#56B4E9", "#0072B2", "#D55E00", "#999999"
 
-BEFORE = {"color": BLACK, "marker": "o", "markerfacecolor": "white", "linestyle": (0, (1, 1))}
-LINES = {"color": BLUE, "marker": "s", "markerfacecolor": BLUE, "linestyle": "-"}
-SPIRAL = {"color": ORANGE, "marker": "^", "markerfacecolor": "white", "linestyle": (0, (5, 1))}
-COMMANDED = {"color": GREY, "marker": "+", "markersize": 3.5, "linestyle": "-", "linewidth": 0.6}
-PUBLISHED = {"color": VERMILION, "marker": "D", "markerfacecolor": "white", "linestyle": "-"}
-TOLERANCE = {"color": VERMILION, "linestyle": (0, (4, 2, 1, 2)), "linewidth": 0.8}
+BEFORE: Look = {"color": BLACK, "marker": "o", "markerfacecolor": "white", "linestyle": (0, (1, 1))}
+LINES: Look = {"color": BLUE, "marker": "s", "markerfacecolor": BLUE, "linestyle": "-"}
+SPIRAL: Look = {"color": ORANGE, "marker": "^", "markerfacecolor": "white", "linestyle": (0, (5, 1))}
+COMMANDED: Look = {"color": GREY, "marker": "+", "markersize": 3.5, "linestyle": "-", "linewidth": 0.6}
+PUBLISHED: Look = {"color": VERMILION, "marker": "D", "markerfacecolor": "white", "linestyle": "-"}
+TOLERANCE: Look = {"color": VERMILION, "linestyle": (0, (4, 2, 1, 2)), "linewidth": 0.8}
 # light end for small numbers; lightness alone orders it, so that it reads in grey
 SEQUENTIAL = "Blues"
 MEASURE = "viridis"
@@ -61,46 +78,47 @@ _STYLE = {
 
 
 @contextmanager
-def print_style():
+def print_style() -> Iterator[None]:
     """Matplotlib's own defaults with the print style on top, whatever the user's settings are."""
     with style.context(["default", _STYLE], after_reset=True):
         yield
 
 
-def printed(draw):
+def printed(draw: Drawing) -> Drawing:
     """A figure function that draws in print style."""
 
     @wraps(draw)
-    def styled(tables, options):
+    def styled(tables: Tables, options: Options) -> Figure:
         with print_style():
             return draw(tables, options)
 
     return styled
 
 
-def new(width_mm, height_mm):
+def new(width_mm: float, height_mm: float) -> Figure:
     """An empty figure that keeps its size and arranges its panels by itself."""
-    figure = Figure(figsize=(width_mm / _MM_PER_INCH, height_mm / _MM_PER_INCH), layout="constrained")
-    figure.get_layout_engine().set(w_pad=0.03, h_pad=0.03, wspace=0.03, hspace=0.04)
-    return figure
+    engine = ConstrainedLayoutEngine(w_pad=0.03, h_pad=0.03, wspace=0.03, hspace=0.04)
+    return Figure(figsize=(width_mm / _MM_PER_INCH, height_mm / _MM_PER_INCH), layout=engine)
 
 
-def note(text):
+def note(text: str) -> Figure:
     """A figure that says in a line why there is nothing to draw."""
     figure = new(DOUBLE_MM, 20.0)
     figure.text(0.5, 0.5, text, ha="center", va="center")
     return figure
 
 
-def legend_above(figure, axes, columns=5, side="upper"):
+def legend_above(figure: Figure, axes: Iterable[Axes], columns: int = 5, side: str = "upper") -> None:
     """One legend above all panels, where it covers no data, in as few rows of `columns` as it takes; side: or lower."""
     entries = _entries(axes)
     rows = max(-(-len(entries) // columns), 1)
-    place = {"loc": f"outside {side} center", "ncols": max(-(-len(entries) // rows), 1), "columnspacing": 1.4}
+    place: Look = {"loc": f"outside {side} center", "ncols": max(-(-len(entries) // rows), 1), "columnspacing": 1.4}
     figure.legend(entries.values(), entries.keys(), **place)
 
 
-def panel_grid(count, row_mm, above_mm=14.0, each=1, wide=False, **options):
+def panel_grid(
+    count: int, row_mm: float, above_mm: float = 14.0, each: int = 1, wide: bool = False, **options: Any
+) -> tuple[Figure, AxesArray]:
     """A figure with `each` axes side by side per panel, two panels a row: the figure and the axes (count, each) in use.
 
     row_mm, above_mm: heights of a row of panels and of what stands above them; one panel makes a narrow figure. wide:
@@ -115,7 +133,7 @@ def panel_grid(count, row_mm, above_mm=14.0, each=1, wide=False, **options):
     return figure, panels[:count]
 
 
-def legend_inside(place, axes):
+def legend_inside(place: Axes, axes: Iterable[Axes]) -> None:
     """One legend for the given axes in a place that is left empty for it."""
     entries = _entries(axes)
     labels = [fill(label, _NARROW) for label in entries]
@@ -123,16 +141,16 @@ def legend_inside(place, axes):
     legend.set_in_layout(False)
 
 
-def _entries(axes):
+def _entries(axes: Iterable[Axes]) -> dict[str, Artist]:
     """Legend entries of axes: label to handle, each label once."""
-    entries = {}
+    entries: dict[str, Artist] = {}
     for one in axes:
         for handle, label in zip(*one.get_legend_handles_labels(), strict=True):
             entries.setdefault(label, handle)
     return entries
 
 
-def magnification(deviation_mm, span_mm, share=0.16):
+def magnification(deviation_mm: npt.ArrayLike, span_mm: float, share: float = 0.16) -> float:
     """Round factor (1, 2, 5, 10, ...) that makes the largest deviation about `share` of the span; 1 without any."""
     sizes = np.abs(np.asarray(deviation_mm, dtype=float))
     largest = sizes[np.isfinite(sizes)].max(initial=0.0)
@@ -143,7 +161,7 @@ def magnification(deviation_mm, span_mm, share=0.16):
     return float(decade * max(step for step in (1.0, 2.0, 5.0) if step * decade <= wanted * (1.0 + 1e-12)))
 
 
-def number(value):
+def number(value: float) -> str:
     """An error to two decimals, more where it is small, fewer where it is large; a dash where there is none."""
     if not np.isfinite(value):
         return "–"
@@ -152,46 +170,34 @@ def number(value):
     return f"{value:.{digits}f}".replace("-", "\N{MINUS SIGN}")
 
 
-def plain_log(axis):
+def plain_log(axis: Axis) -> None:
     """Ticks of a log axis as plain numbers at the decades: the digits of powers would be too small to read."""
     axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axis.set_minor_formatter(NullFormatter())
 
 
-def short_log(axis):
+def short_log(axis: Axis) -> None:
     """Ticks of a short log axis at 1 and 3 of every decade, as plain numbers."""
     axis.set_major_locator(LogLocator(subs=(1.0, 3.0)))
     plain_log(axis)
 
 
-def _pdf():
-    from rrru.figures.pdf_canvas import FigureCanvasPdf
+def _canvas(kind: str) -> type[FigureCanvasBase]:
+    """What draws a figure's file of a kind; imported where such a file is written."""
+    if kind == "pdf":
+        from rrru.figures.pdf_canvas import FigureCanvasPdf
 
-    return FigureCanvasPdf
+        return FigureCanvasPdf
+    if kind == "png":
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-
-def _png():
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-
-    return FigureCanvasAgg
-
-
-def _svg():
+        return FigureCanvasAgg
     from matplotlib.backends.backend_svg import FigureCanvasSVG
 
     return FigureCanvasSVG
 
 
-# files of a figure: what draws them, imported where such a file is written; the entry that would hold a date or a
-# version; the one for the caption
-KINDS = {
-    "pdf": (_pdf, "CreationDate", "Subject"),
-    "png": (_png, "Software", "Description"),
-    "svg": (_svg, "Date", "Description"),
-}
-
-
-def save(figure, paths, caption=""):
+def save(figure: Figure, paths: Mapping[str, str], caption: str = "") -> None:
     """Write the files of a figure; they carry its caption but no date, and none is replaced before all are whole.
 
     paths: by kind, of `KINDS`. The same tables give the same bytes under the same versions of Matplotlib and its font
@@ -202,12 +208,12 @@ def save(figure, paths, caption=""):
         for kind, path in zip(paths, partial, strict=True):
             # straight to the canvas: savefig would draw everything a second time to arrange it
             figure.set_dpi(_DPI)
-            canvas, undated, described = KINDS[kind]
-            write = getattr(canvas()(figure), f"print_{kind}")
+            undated, described = KINDS[kind]
+            write = getattr(_canvas(kind)(figure), f"print_{kind}")
             write(path, metadata={undated: None, described: caption})
 
 
-def arrange(figure):
+def arrange(figure: Figure) -> None:
     """Give the panels their places once, so that all files of a figure, and every later one, have them there."""
     if engine := figure.get_layout_engine():
         # of a line of text alone it would warn that there is nothing to arrange
@@ -224,7 +230,7 @@ def arrange(figure):
             axes.set_in_layout(arranged)
 
 
-def height_axis(axes, z_down):
+def height_axis(axes: Axes, z_down: bool) -> None:
     """Label the vertical axis as the robot frame's z and turn it round where z points down."""
     axes.set_ylabel("z (mm), down" if z_down else "z (mm)")
     if z_down:

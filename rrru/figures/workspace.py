@@ -1,28 +1,41 @@
 """Where in the workspace the trajectories lie, and how far from both kinds of singularity."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
 from matplotlib.colors import BoundaryNorm
+from matplotlib.figure import Figure
+from matplotlib.image import AxesImage
 from matplotlib.lines import Line2D
 
+from rrru.arrays import FloatArray
 from rrru.errors import ConfigError
 from rrru.figures import choose, style
+from rrru.figures.choose import Options, Tables
 
 # axes of a slice, and the one across it
 _SLICES = {"xz": ("x", "z", "y"), "xy": ("x", "y", "z")}
 # finer towards a singularity, which is what matters
 _LEVELS = (0.0, 0.05, 0.1, 0.2, 0.3, 0.4, 0.6, 1.0)
-_NEAR = {"color": style.VERMILION, "linestyle": "none", "marker": "o", "markersize": 2.6, "markerfacecolor": "white"}
-_PATH = {"color": "black", "linewidth": 0.8}
+_NEAR: style.Look = {
+    "color": style.VERMILION,
+    "linestyle": "none",
+    "marker": "o",
+    "markersize": 2.6,
+    "markerfacecolor": "white",
+}
+_PATH: style.Look = {"color": "black", "linewidth": 0.8}
 _MEASURES = {"translational_measure": "translational measure", "constraint_measure": "constraint measure"}
 
 _AT_POSES = {"translational_measure": "position Jacobian", "constraint_measure": "constraint measure"}
 _VIEWS = ("side view", "top view")
-_DOT = {"s": 11.0, "edgecolors": "#444444", "linewidths": 0.25}
-_NEAR_POSE = {**_NEAR, "markersize": 6.0, "markerfacecolor": "none"}
+_DOT: style.Look = {"s": 11.0, "edgecolors": "#444444", "linewidths": 0.25}
+_NEAR_POSE: style.Look = {**_NEAR, "markersize": 6.0, "markerfacecolor": "none"}
 _OF_LOOPS = "smallest singular value of the legs' unit wrenches, 0 at a singularity"
-_BAR_PLACE = {"location": "bottom", "aspect": 60, "fraction": 0.03, "spacing": "uniform"}
+_BAR_PLACE: style.Look = {"location": "bottom", "aspect": 60, "fraction": 0.03, "spacing": "uniform"}
 _BAR = "smallest / largest singular value of the position Jacobian, 0 at a singularity"
 # a constraint measure above this is 1 up to rounding; heights of a view over its width
 _NO_LOOP, _LOWEST, _HIGHEST = 1.0 - 1e-6, 0.35, 1.1
@@ -31,7 +44,7 @@ _FIELDS = (*_MEASURES, "constraint_determinant")
 
 
 @style.printed
-def workspace(tables, options):
+def workspace(tables: Tables, options: Options) -> Figure:
     """Distance from singularities, and the commanded points, projected. A robot that cannot orient its tool has it over
     the reachable workspace: hatched is out of reach; on the line the constraint determinant changes its sign. A robot
     that orients it has it at the commanded poses, since its reach depends on the orientation: the smallest over the
@@ -69,7 +82,7 @@ def workspace(tables, options):
     return figure
 
 
-def _at_poses(points, z_down):
+def _at_poses(points: pd.DataFrame, z_down: bool) -> Figure:
     """The commanded points from the side and from above, coloured by each measure at their own pose."""
     # an open chain has no constraint to lose: its constraint measure is 1 everywhere
     closed = bool((points["constraint_measure"] < _NO_LOOP).any())
@@ -108,13 +121,13 @@ class _Slice:
 
     across: str
     up: str
-    across_mm: np.ndarray
-    up_mm: np.ndarray
-    fields: dict
+    across_mm: FloatArray
+    up_mm: FloatArray
+    fields: dict[str, FloatArray]
     place: str
 
 
-def _slice(rows, name):
+def _slice(rows: pd.DataFrame, name: str) -> _Slice:
     """A slice from its rows of `workspace`; what the robot cannot reach is shown as a margin only."""
     across, up, normal = _SLICES[name]
     reachable = rows["reachable"].astype(bool)
@@ -132,7 +145,7 @@ def _slice(rows, name):
     return _Slice(across, up, grid.columns.to_numpy(), grid.index.to_numpy(), fields, place)
 
 
-def _points(tables, campaign):
+def _points(tables: Tables, campaign: str) -> pd.DataFrame:
     """Commanded points of the campaign with their singularity status and measures."""
     columns = ["run", "point", "status", *_MEASURES]
     singular = choose.of_campaign(tables, "singularity", campaign, "workspace")[columns]
@@ -140,7 +153,13 @@ def _points(tables, campaign):
     return paths.merge(singular, on=["run", "point"], how="left", validate="one_to_one")
 
 
-def draw_measure(axes, places_mm, measure, line=None, levels=_LEVELS):
+def draw_measure(
+    axes: Axes,
+    places_mm: tuple[FloatArray, FloatArray],
+    measure: FloatArray,
+    line: FloatArray | None = None,
+    levels: Sequence[float] = _LEVELS,
+) -> AxesImage:
     """One measure over a slice (vertical, horizontal) as an image, hatched out of reach; returns the image.
 
     places_mm: horizontal and vertical coordinates; line: field whose zero line is drawn where it changes its sign.
@@ -164,7 +183,7 @@ def draw_measure(axes, places_mm, measure, line=None, levels=_LEVELS):
     return image
 
 
-def _trajectories(axes, points, grid):
+def _trajectories(axes: Axes, points: pd.DataFrame, grid: _Slice) -> None:
     """Every trajectory's first pass as a line, the points near a singularity marked."""
     across, up = f"command_{grid.across}_mm", f"command_{grid.up}_mm"
     for _, part in points.groupby("trajectory", sort=False):
@@ -175,7 +194,7 @@ def _trajectories(axes, points, grid):
     axes.plot(near[across], near[up], **_NEAR, zorder=5)
 
 
-def _legend(points):
+def _legend(points: pd.DataFrame) -> list[Line2D]:
     """What the lines and marks are."""
     handles = [
         Line2D([], [], **_PATH, label="commanded paths (projected)"),

@@ -56,6 +56,8 @@ def read(file: Path) -> Urdf:
         children.setdefault(link.get("name", ""), [])
         for shape in (*link.findall("visual"), *link.findall("collision")):
             link.remove(shape)
+    if not children:
+        raise ConfigError(f"{file}: it has no link; allowed: a URDF with links and joints")
     for joint in robot.findall("joint"):
         # MuJoCo refuses what has no name, parent or child
         name, parent, child = joint.get("name", ""), *(_link(joint, end) for end in ("parent", "child"))

@@ -46,10 +46,12 @@ def check_schema(config: Mapping[str, Any], file: str | Path, parts: bool = Fals
         rules = _without(rules, _COUNTED) | {"properties": partly | whole}
     error = exceptions.best_match(strict(rules).iter_errors(config))
     if error:
+        error = _of_its_type(error)
         kind = error.validator_value if error.validator == "type" else None
         allowed = f"; allowed: {_STRICT[kind][1]}" if isinstance(kind, str) and kind in _STRICT else ""
         place = ".".join(map(str, error.absolute_path)) or "configuration"
-        raise ConfigError(f"{place}: {error.message}{allowed}{_as_number(error)}{_meant(error)}")
+        said = _choices(error) or f"{_said(error)}{allowed}{_as_number(error)}{_meant(error)}"
+        raise ConfigError(f"{place}: {said}")
 
 
 def set_defaults(config: dict[str, Any], file: str | Path) -> None:
@@ -122,6 +124,30 @@ def _as_number(error: "ValidationError") -> str:
         return ""
     # in YAML's form: with a point and a sign in the exponent
     return f"; it is text to YAML: write {yaml.safe_dump(number).split()[0]}, without quotes"
+
+
+def _of_its_type(error: "ValidationError") -> "ValidationError":
+    """The error of the only alternative that is of the value's type, or the error itself."""
+    others = [one for one in error.context or () if one.validator != "type"]
+    return _of_its_type(others[0]) if len(others) == 1 else error
+
+
+def _said(error: "ValidationError") -> str:
+    """What is wrong: of a mapping that has keys that are no text only these, since it may be long."""
+    if error.validator_value == "object" and isinstance(error.instance, dict):
+        return f"has the key {', '.join(repr(key) for key in error.instance if not isinstance(key, str))}"
+    return str(error.message)
+
+
+def _choices(error: "ValidationError") -> str:
+    """What a mapping has that needs one of several sets of keys, and these; "" for any other error."""
+    if error.validator != "oneOf" or not isinstance(error.instance, dict):
+        return ""
+    if not all(one.keys() == {"required"} for one in error.validator_value):
+        return ""
+    choices = ", or ".join(" and ".join(one["required"]) for one in error.validator_value)
+    has = f"has the keys {', '.join(error.instance)}" if error.instance else "has no key"
+    return f"{has}; allowed: the keys {choices}"
 
 
 def _meant(error: "ValidationError") -> str:

@@ -16,6 +16,7 @@ from matplotlib.text import Text
 
 from rrru.errors import ConfigError, RrruError, WriteError
 from rrru.figures import choose, observability, style
+from rrru.figures.files import KINDS
 from tests.figures import synthetic_gap
 from tests.figures import synthetic_tables as synthetic
 from tests.figures.catalogue import FIGURES
@@ -105,7 +106,7 @@ def draw(name, frames, **options):
 
 def files(path):
     """Paths of a figure's files without their ending."""
-    return {kind: f"{path}.{kind}" for kind in style.KINDS}
+    return {kind: f"{path}.{kind}" for kind in KINDS}
 
 
 def labels(figure):
@@ -138,7 +139,7 @@ def test_a_figure_is_complete_and_its_files_are_the_same_bytes_every_time(name, 
     first, again = draw(name, frames), draw(name, frames)
     style.save(first, files(tmp_path / "first"))
     style.save(again, files(tmp_path / "again"))
-    for kind in style.KINDS:
+    for kind in KINDS:
         assert (tmp_path / f"first.{kind}").read_bytes() == (tmp_path / f"again.{kind}").read_bytes()
     assert b"CreationDate" not in (tmp_path / "first.pdf").read_bytes()
     assert "<dc:date>" not in (tmp_path / "first.svg").read_text()
@@ -155,9 +156,7 @@ def test_a_figure_is_complete_and_its_files_are_the_same_bytes_every_time(name, 
     assert width == pytest.approx(85.0 if name == "gap_map" else 175.0) and height < 240.0
     box = first.get_tightbbox()
     assert min(box.x0, box.y0) > -0.01 and box.x1 * 25.4 < width + 0.3 and box.y1 * 25.4 < height + 0.3
-    assert {path.name for path in tmp_path.iterdir()} == {
-        f"{n}.{kind}" for n in ("again", "first") for kind in style.KINDS
-    }
+    assert {path.name for path in tmp_path.iterdir()} == {f"{n}.{kind}" for n in ("again", "first") for kind in KINDS}
 
 
 def test_bytes_do_not_depend_on_the_process_or_the_user_s_settings(frames, tmp_path):
@@ -165,12 +164,12 @@ def test_bytes_do_not_depend_on_the_process_or_the_user_s_settings(frames, tmp_p
     (tmp_path / "matplotlibrc").write_text("font.size: 20\nlines.linewidth: 5\npdf.fonttype: 3\nsavefig.bbox: tight\n")
     code = (
         "from tests.figures import synthetic_tables as s; from tests.figures.catalogue import FIGURES;"
-        "from rrru.figures import style;"
-        "style.save(FIGURES['fig09'][0](s.all_tables(), s.OPTIONS), {k: f'there.{k}' for k in style.KINDS})"
+        "from rrru.figures import style; from rrru.figures.files import KINDS;"
+        "style.save(FIGURES['fig09'][0](s.all_tables(), s.OPTIONS), {k: f'there.{k}' for k in KINDS})"
     )
     environment = os.environ | {"PYTHONPATH": str(ROOT), "PYTHONHASHSEED": "99"}
     subprocess.run([sys.executable, "-c", code], cwd=tmp_path, env=environment, check=True)
-    for kind in style.KINDS:
+    for kind in KINDS:
         assert (tmp_path / f"here.{kind}").read_bytes() == (tmp_path / f"there.{kind}").read_bytes()
 
 

@@ -55,6 +55,7 @@ def test_errors_of_a_urdf(tmp_path, joints, options, pattern):
     [
         ("<robot>", "no element found"),
         ("<mujoco/>", "its root is 'mujoco'"),
+        ('<robot name="r"/>', "it has no link; allowed: a URDF with links and joints"),
         ('<robot name="r" xmlns:xacro="http://wiki.ros.org/xacro"><xacro:macro/><link name="a"/></robot>', "xacro"),
     ],
 )

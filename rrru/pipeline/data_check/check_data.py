@@ -3,7 +3,7 @@
 The command `rrru check` prints it.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -22,9 +22,11 @@ from rrru.errors import ConfigError, IngestError, Problem
 from rrru.kinematics.robot import Robot
 from rrru.pipeline.config import own_robot
 from rrru.pipeline.data_check.costs import costs, enough_poses, without_times
-from rrru.pipeline.data_check.propose import fitting_robots, propose
+from rrru.pipeline.data_check.propose import STEPS, fitting_robots, propose
 from rrru.pipeline.option_text import as_command, options_in
+from rrru.pipeline.progress import Progress, shown
 
+_LAST_STEP = "what it determines"
 _SHOWN = 8
 # longest line of the overlay
 _WIDE = 110
@@ -78,13 +80,30 @@ class Check:
 
 
 def check_file(
-    file: str | Path, config: Mapping[str, Any], robot: str | None = None, commands: str | Path | None = None
+    file: str | Path,
+    config: Mapping[str, Any],
+    robot: str | None = None,
+    commands: str | Path | None = None,
+    progress: bool | Progress = False,
 ) -> Check:
     """The Check of a file for a robot of the configuration.
 
-    A campaign of the configuration with this file is used unchanged, with proposals for its missing keys. Raises
-    IngestError for a file that cannot be read and ConfigError for an unknown robot.
+    A campaign of the configuration with this file is used unchanged, with proposals for its missing keys. progress:
+    True for a bar, or a function of each step, its number and the number of steps. Raises IngestError for a file that
+    cannot be read and ConfigError for an unknown robot.
     """
+    with shown(progress, (*STEPS, _LAST_STEP)) as begin:
+        return _check(file, config, robot, commands, begin or (lambda step: None))
+
+
+def _check(
+    file: str | Path,
+    config: Mapping[str, Any],
+    robot: str | None,
+    commands: str | Path | None,
+    begin: Callable[[str], object],
+) -> Check:
+    """The Check of a file, see `check_file`; begin: called with each step as it begins."""
     section: dict[str, Any] = next((one for one in config["campaigns"].values() if one.get("ingest") == str(file)), {})
     arguments = {key: value for key, value in (("robot", robot), ("commands", commands)) if value}
     given = {"robot": None, "ingest": str(file)} | section | arguments
@@ -93,7 +112,8 @@ def check_file(
         known = f"allowed: {', '.join(config['robots'])}, or a URDF or MJCF file, or one of a --config file (CONFIG=..)"
         fitting = fitting_robots(given, config)
         raise ConfigError(f"{named}; {known}" + (f"; this file fits {' and '.join(fitting)}" if fitting else ""))
-    found = propose(given, config)
+    found = propose(given, config, begin)
+    begin(_LAST_STEP)
     section, cells, mechanism, result = found.section, found.cells, found.mechanism, found.result
     lines = [_content(section, cells), *_used(section, cells, mechanism)]
     if result is None:
@@ -172,12 +192,13 @@ def print_check(
     robot: str | None = None,
     commands: str | Path | None = None,
     overlays: Sequence[str | Path] = (),
+    progress: bool | Progress = False,
 ) -> bool:
     """Print the check of a file; returns whether ingest accepts it. Arguments and errors as for `check_file`.
 
     overlays: files of the configuration, for the command that is proposed.
     """
-    found = check_file(file, config, robot, commands)
+    found = check_file(file, config, robot, commands, progress)
     print("\n".join(found.lines))
     for problem in found.refused[:_SHOWN]:
         print(f"refused: {IngestError([problem])}")

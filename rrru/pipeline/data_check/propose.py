@@ -1,6 +1,6 @@
 """Missing keys of a campaign's section, found by trial, for the user to accept."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
@@ -27,6 +27,7 @@ from rrru.kinematics.robot import Robot
 from rrru.pipeline import config as parts
 from rrru.pipeline import setup
 
+STEPS = ("columns", "units and frame", "motion")
 # number of points for the test whether a file is of a robot
 _PROBES = 20
 # least share of them that a robot has to reach
@@ -52,13 +53,23 @@ class Proposal:
     refused: tuple[Problem, ...]
 
 
-def propose(section: Section, config: Mapping[str, Any]) -> Proposal:
-    """The Proposal for a section that names file and robot; raises IngestError for a file that cannot be read."""
+def propose(
+    section: Section, config: Mapping[str, Any], begin: Callable[[str], object] = lambda step: None
+) -> Proposal:
+    """The Proposal for a section that names file and robot; raises IngestError for a file that cannot be read.
+
+    begin: called with each of `STEPS` as it begins.
+    """
+    columns, fit, motion = STEPS
+    begin(columns)
     mechanism = setup.mechanism(parts.robot(config, section))
-    if "columns" in section and (stated := _as_stated(section, mechanism)):
-        return _with_motion(stated)
-    cells, section = _with_columns(_with_formats(section), mechanism)
-    return _with_motion(_fitting(section, cells, mechanism))
+    found = _as_stated(section, mechanism) if "columns" in section else None
+    if found is None:
+        cells, section = _with_columns(_with_formats(section), mechanism)
+        begin(fit)
+        found = _fitting(section, cells, mechanism)
+    begin(motion)
+    return _with_motion(found)
 
 
 def _as_stated(section: Section, mechanism: Robot) -> Proposal | None:

@@ -1,6 +1,6 @@
 """Diagnosis of one campaign's gap between calibrated model and measurements, with its figures."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping
 from typing import Any
 
 import pandas as pd
@@ -82,7 +82,7 @@ def write(
     result: core.Diagnosis,
     nominal: Robot,
     paths: Mapping[str, str],
-    kinds: Sequence[str] = KINDS,
+    kinds: Collection[str] = KINDS,
 ) -> None:
     """Write verdict, tables and figures of a Diagnosis to paths by name.
 

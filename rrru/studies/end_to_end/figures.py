@@ -1,18 +1,20 @@
 """Figure of the residuals of a robot's given, calibrated and corrected file on a held-out campaign."""
 
-from rrru.figures import style
-from rrru.figures.choose import where
+from matplotlib.figure import Figure
 
-_MODELS = {
+from rrru.figures import style
+from rrru.figures.choose import Options, Tables, where
+
+_MODELS: dict[str, tuple[str, style.Look]] = {
     "given": ("your file", {"color": style.BLACK, "marker": "o", "markerfacecolor": "white"}),
     "calibrated": ("calibrated", {"color": style.ORANGE, "marker": "^", "markerfacecolor": "white"}),
     "corrected": ("corrected", {"color": style.BLUE, "marker": "s"}),
 }
-_NOISE = {"color": style.GREY, "linestyle": (0, (4, 2)), "linewidth": 0.9}
+_NOISE: style.Look = {"color": style.GREY, "linestyle": (0, (4, 2)), "linewidth": 0.9}
 
 
 @style.printed
-def circle(tables, options):
+def circle(tables: Tables, options: Options) -> Figure:
     """Measured minus modelled position on a held-out campaign: the robot's file as given, its parameters calibrated,
     and the corrected file of the diagnosis. (a) Point by point. (b) All points, compared with the instrument's noise.
     """

@@ -1,20 +1,26 @@
 """A robot's file as given, calibrated and corrected, evaluated on a held-out campaign. Lengths in mm."""
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
+from rrru.arrays import FloatArray
 from rrru.campaign import measurements as rows
 from rrru.diagnosis.correction.corrected_model import simulated
 from rrru.diagnosis.make_problem import make_diagnosis_problem
 from rrru.diagnosis.shrink import gap_rms
+from rrru.effects.protocol import Motion
 from rrru.errors import ConfigError
 from rrru.formats.mjcf_writer import measured_tool_mm
+from rrru.kinematics.dynamics import Masses
+from rrru.kinematics.robot import Robot
 from rrru.robots.catalogue import make_mechanism
 
 
-def check(config):
+def check(config: Mapping[str, Any]) -> None:
     """Raise ConfigError where `circle` names an unknown campaign, or not the same robot of an MJCF for both."""
     section = config.get("circle")
     if not section:
@@ -31,7 +37,13 @@ def check(config):
         raise ConfigError(f"circle.calibration: {section['calibration']!r}; known sets: {known}")
 
 
-def errors(fresh, nominal, masses, calibrated, corrected):
+def errors(
+    fresh: pd.DataFrame,
+    nominal: Mapping[str, Any],
+    masses: Masses,
+    calibrated: tuple[Robot, FloatArray],
+    corrected: str | Path,
+) -> pd.DataFrame:
     """Frame `circle_points` of a measurement table: errors of each model at every usable point.
 
     nominal: the robot's part of the configuration, of an MJCF; calibrated: its Robot and deviations; corrected: path of
@@ -63,7 +75,7 @@ def errors(fresh, nominal, masses, calibrated, corrected):
     return pd.concat(frames, ignore_index=True)
 
 
-def sizes(points, effects, noise_mm):
+def sizes(points: pd.DataFrame, effects: str, noise_mm: float) -> pd.DataFrame:
     """Frame `circle` without its campaigns from `circle_points`; effects: found by the diagnosis; noise per axis."""
     result, noise = [], float(np.sqrt(3.0) * noise_mm)
     for model, rows_of_model in points.groupby("model", sort=False):
@@ -74,7 +86,7 @@ def sizes(points, effects, noise_mm):
     return pd.DataFrame(result)
 
 
-def _driven(motion, robot, section):
+def _driven(motion: Motion, robot: Robot, section: Mapping[str, Any]) -> FloatArray:
     """Positions (n, 3) of the tool of a robot's file that MuJoCo simulates along a Motion."""
     poses, twists = simulated(motion, robot, Path(section["mjcf"]), section["platform"])
     return robot.measured(poses, twists)

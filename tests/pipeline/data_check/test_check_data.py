@@ -344,3 +344,10 @@ def _two_targets(robot):
     columns = dict(zip(robot.parts.columns, np.repeat(drive, 2, axis=0).T, strict=True))
     columns |= {f"measured_{axis}_mm": column for axis, column in zip("xyz", seen.T, strict=True)}
     return pd.DataFrame({"trajectory": "row", "target": ["a", "b"] * 60, **columns})
+
+
+def test_every_step_of_a_check_is_reported_as_it_begins():
+    steps = []
+    assert not check_file("data/field_12.csv", CONFIG, "rrru3", progress=lambda *step: steps.append(step)).refused
+    assert [name for name, *_ in steps] == ["columns", "units and frame", "motion", "what it determines"]
+    assert [numbers for _, *numbers in steps] == [[0, 4], [1, 4], [2, 4], [3, 4]]
