@@ -7,10 +7,10 @@ from itertools import pairwise
 
 import numpy as np
 from scipy.linalg import cho_solve, solve_triangular
+from scipy.special import ndtr, stdtrit
 
 from rrru.arrays import FloatArray, IntArray
 from rrru.campaign.noise import along_runs
-from rrru.diagnosis.drive_spectra import jumps, over_range
 from rrru.diagnosis.evidence import ModelEvidence
 from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.problem import DiagnosisProblem
@@ -142,10 +142,40 @@ class HeldOut:
         self, terms: Sequence[EffectTerm], prior_scales: Sequence[float] | FloatArray, level: int
     ) -> FloatArray:
         """Mean squared error (n,) of each reading over the drives' ranges by jumps of their functions between stops."""
-        linear, library, motion = self.evidence.linear, self.evidence.library, self.problem.motion
         result = np.zeros(len(self.problem))
+        for size_mm2, steps, squares in self._jumps(terms, prior_scales, level):
+            result += steps * squares.sum() / 6.0 * size_mm2
+        return result
+
+    def drawn_jumps_mm2(
+        self,
+        terms: Sequence[EffectTerm],
+        prior_scales: Sequence[float] | FloatArray,
+        level: int,
+        drawn: tuple[np.random.Generator, int],
+    ) -> FloatArray:
+        """Draws (b, n) of `jumps_mm2`; drawn: generator and number of draws.
+
+        The function jumps with its probability, between two stops at any place alike. At the share u of the way its
+        squared error over the way is d^2 (u^3 + (1 - u)^3) / 3, d^2 / 6 in the mean.
+        """
+        generator, draws = drawn
+        result = np.zeros((draws, len(self.problem)))
+        for size_mm2, steps, squares in self._jumps(terms, prior_scales, level):
+            jumps, place = generator.random(draws) < steps, generator.random((draws, len(squares)))
+            made = (place**3 + (1.0 - place) ** 3) @ squares / 3.0
+            result += np.outer(np.where(jumps, made, 0.0), size_mm2)
+        return result
+
+    def _jumps(
+        self, terms: Sequence[EffectTerm], prior_scales: Sequence[float] | FloatArray, level: int
+    ) -> Iterator[tuple[FloatArray, float, FloatArray]]:
+        """By drive whose function may jump: squares (n,) that a unit of its error makes at the readings, in mm2, the
+        probability that it jumps, and of each way between stops the squared change times the share of the range (g,).
+        """
+        linear, library, motion = self.evidence.linear, self.evidence.library, self.problem.motion
         if not any(library[term.effect].steps for term in terms):
-            return result
+            return
         start, mean = linear.base.shape[-1], whole_fit(*self._system(terms, prior_scales, level)).mean
         used = motion.drive[self.problem.used]
         for term, block in zip(terms, signatures(library, linear, terms), strict=True):
@@ -156,12 +186,11 @@ class HeldOut:
                 continue
             coordinates = spread(effect.coordinates, term.legs) @ of_term
             functions = enumerate(effect.along_drives(replace(motion, drive=used)))
-            for (k, function), value in zip(functions, over_range(used).T, strict=True):
-                own = effect.coordinates.legs == k + 1
-                before, after, share = jumps(value, used[:, k], function @ coordinates[own])
-                variance = effect.steps * ((after - before) ** 2 * share * (1.0 - share)).mean()
-                result += variance * (linear.drive[:, :, k] ** 2).sum(axis=1)
-        return result
+            for k, function in functions:
+                at, first = np.unique(used[:, k], return_index=True)
+                change = np.diff(function[first] @ coordinates[effect.coordinates.legs == k + 1])
+                share = np.diff(at) / max(np.ptp(at), 1e-300)
+                yield (linear.drive[:, :, k] ** 2).sum(axis=1), effect.steps, change**2 * share
 
     def gains(self, terms: Sequence[EffectTerm], prior_scales: Sequence[float] | FloatArray, level: int) -> list[float]:
         """Log predictive score that each of the terms adds to that of the others, at these prior scales.
@@ -250,11 +279,33 @@ def within(run: IntArray, at: IntArray) -> IntArray:
     return result
 
 
+def resampled_groups(problem: DiagnosisProblem) -> IntArray:
+    """Labels (m,) of the runs, or of stretches of five points where there are few runs, that are resampled as one."""
+    run = problem.run
+    if len(np.unique(run)) >= OPTIONS.min_resampled_runs:
+        return np.asarray(run)
+    return np.asarray(run * (len(run) + 1) + within(run, problem.stop) // OPTIONS.points_per_stretch)
+
+
+def resampled_quantiles(problem: DiagnosisProblem) -> tuple[float, float]:
+    """Quantiles of statistics of `resampled_rows` between which their 95 % interval is.
+
+    Resampling n groups makes the variance n / (n - 1) too small and knows no uncertainty of it. The quantiles are those
+    of the normal distribution at sqrt(n / (n - 1)) times the quantiles of Student's t of n - 1 degrees of freedom
+    (T. Hesterberg, What teachers should know about the bootstrap, The American Statistician 69, 2015, section 3.3).
+    """
+    count = len(np.unique(resampled_groups(problem)))
+    if count < 2:
+        return 0.0, 1.0
+    low, high = (
+        float(ndtr(np.sqrt(count / (count - 1.0)) * stdtrit(count - 1, one))) for one in OPTIONS.interval_quantiles
+    )
+    return low, high
+
+
 def resampled_rows(problem: DiagnosisProblem, generator: np.random.Generator, draws: int) -> IntArray:
-    """Rows (draws, m) of a problem resampled by runs, or by stretches of five points where there are few runs."""
-    block = run = problem.run
-    if len(np.unique(run)) < OPTIONS.min_resampled_runs:
-        block = run * (len(run) + 1) + within(run, problem.stop) // OPTIONS.points_per_stretch
+    """Rows (draws, m) of a problem resampled by `resampled_groups`."""
+    run, block = problem.run, resampled_groups(problem)
     groups = [np.flatnonzero(block == label) for label in dict.fromkeys(block.tolist())]
     result = np.empty((draws, len(run)), dtype=int)
     for k in range(draws):

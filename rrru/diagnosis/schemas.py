@@ -72,15 +72,15 @@ reason                 str    why {not measured, stale reading, outlier in the f
 points                 int    points left out
 
 ## gap_budget | tables/gap_budget.parquet | campaign part
-What the gap's mean square is made of. Shares add up to 1; calibration is no part of what is measured on fitted points
-and is added to their gap.
+What the gap's mean square is made of. Shares add up to 1 without that of sampling, which is no error of the robot;
+calibration is no part of what is measured on fitted points and is added to their gap.
 --
 campaign
 part                   str    effect, or kind; of a covariance both effects
 kind                   str    effect; scatter: what does not repeat, noise above the stated; runs: offsets between runs;
-    unexplained: systematic and predicted by nothing; covariance: of two confounded effects; sampling: of this draw of
-    the noise; calibration: uncertainty of its parameters {effect, scatter, runs, unexplained,
-    covariance, sampling, calibration}
+    unexplained: systematic and predicted by nothing; covariance: of two confounded effects; sampling: what was
+    measured minus the other parts, by this draw of the noise; calibration: uncertainty of its parameters
+    {effect, scatter, runs, unexplained, covariance, sampling, calibration}
 rms_mm                 float  root of its mean square, negative where that is
 share                  float  of the gap's mean square
 share_low              float  lower end, 95 %, from the posterior; of a cause that is probable enough for a name, given
