@@ -11,6 +11,7 @@ from scipy.special import ndtr, stdtrit
 
 from rrru.arrays import FloatArray, IntArray
 from rrru.campaign.noise import along_runs
+from rrru.diagnosis.drive_spectra import jumps, over_range
 from rrru.diagnosis.evidence import ModelEvidence
 from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.problem import DiagnosisProblem
@@ -143,8 +144,8 @@ class HeldOut:
     ) -> FloatArray:
         """Mean squared error (n,) of each reading over the drives' ranges by jumps of their functions between stops."""
         result = np.zeros(len(self.problem))
-        for size_mm2, steps, squares in self._jumps(terms, prior_scales, level):
-            result += steps * squares.sum() / 6.0 * size_mm2
+        for size_mm2, jumping in self._jumping(terms, prior_scales, level):
+            result += jumping.mean * size_mm2
         return result
 
     def drawn_jumps_mm2(
@@ -154,24 +155,18 @@ class HeldOut:
         level: int,
         drawn: tuple[np.random.Generator, int],
     ) -> FloatArray:
-        """Draws (b, n) of `jumps_mm2`; drawn: generator and number of draws.
-
-        The function jumps with its probability, between two stops at any place alike. At the share u of the way its
-        squared error over the way is d^2 (u^3 + (1 - u)^3) / 3, d^2 / 6 in the mean.
-        """
+        """Draws (b, n) of `jumps_mm2`; drawn: generator and number of draws."""
         generator, draws = drawn
         result = np.zeros((draws, len(self.problem)))
-        for size_mm2, steps, squares in self._jumps(terms, prior_scales, level):
-            jumps, place = generator.random(draws) < steps, generator.random((draws, len(squares)))
-            made = (place**3 + (1.0 - place) ** 3) @ squares / 3.0
-            result += np.outer(np.where(jumps, made, 0.0), size_mm2)
+        for size_mm2, jumping in self._jumping(terms, prior_scales, level):
+            result += np.outer(jumping.drawn(generator, draws), size_mm2)
         return result
 
-    def _jumps(
+    def _jumping(
         self, terms: Sequence[EffectTerm], prior_scales: Sequence[float] | FloatArray, level: int
-    ) -> Iterator[tuple[FloatArray, float, FloatArray]]:
-        """By drive whose function may jump: squares (n,) that a unit of its error makes at the readings, in mm2, the
-        probability that it jumps, and of each way between stops the squared change times the share of the range (g,).
+    ) -> Iterator[tuple[FloatArray, "_Jumping"]]:
+        """By drive whose function may jump: squares (n,) that a unit of its error makes at the readings, in mm2, and
+        the function.
         """
         linear, library, motion = self.evidence.linear, self.evidence.library, self.problem.motion
         if not any(library[term.effect].steps for term in terms):
@@ -186,11 +181,13 @@ class HeldOut:
                 continue
             coordinates = spread(effect.coordinates, term.legs) @ of_term
             functions = enumerate(effect.along_drives(replace(motion, drive=used)))
-            for k, function in functions:
-                at, first = np.unique(used[:, k], return_index=True)
-                change = np.diff(function[first] @ coordinates[effect.coordinates.legs == k + 1])
-                share = np.diff(at) / max(np.ptp(at), 1e-300)
-                yield (linear.drive[:, :, k] ** 2).sum(axis=1), effect.steps, change**2 * share
+            between = effect.along_drives(replace(motion, drive=over_range(used)))
+            for (k, function), fitted, value in zip(functions, between, over_range(used).T, strict=True):
+                own = coordinates[effect.coordinates.legs == k + 1]
+                before, after, share = jumps(value, used[:, k], function @ own)
+                squares = (fitted @ own - before) ** 2, (fitted @ own - after) ** 2
+                way = np.searchsorted(np.unique(used[:, k]), value, side="right")
+                yield (linear.drive[:, :, k] ** 2).sum(axis=1), _Jumping(effect.steps, *squares, share, way)
 
     def gains(self, terms: Sequence[EffectTerm], prior_scales: Sequence[float] | FloatArray, level: int) -> list[float]:
         """Log predictive score that each of the terms adds to that of the others, at these prior scales.
@@ -269,6 +266,32 @@ class HeldOut:
             return np.broadcast_to(size, self.evidence.linear.data.shape)
         waves = half_waves(series)
         return np.asarray(noise.variance(waves, lengths(series)) + misfit * spectrum(waves)[:, None])
+
+
+@dataclass(frozen=True)
+class _Jumping:
+    """A fitted function at places (p,) over a drive's range, which jumps between two stops with a probability.
+
+    steps: that probability; before, after (p,): its squared errors at places before and beyond the jump; share (p,): of
+    the way between two stops at which each place is, number way (p,): the jump is before it with this probability.
+    """
+
+    steps: float
+    before: FloatArray
+    after: FloatArray
+    share: FloatArray
+    way: IntArray
+
+    @property
+    def mean(self) -> float:
+        """Expected mean square error over the range."""
+        return self.steps * float((self.share * self.after + (1.0 - self.share) * self.before).mean())
+
+    def drawn(self, generator: np.random.Generator, draws: int) -> FloatArray:
+        """Draws (b,) of the mean square error over the range, each with one place of the jump for every way."""
+        acts = generator.random(draws) < self.steps
+        place = generator.random((draws, int(self.way.max()) + 1))[:, self.way]
+        return np.asarray(acts * np.where(self.share > place, self.after, self.before).mean(axis=1))
 
 
 def within(run: IntArray, at: IntArray) -> IntArray:

@@ -23,8 +23,9 @@ unnamed                str    names joined by + of possible effects that the cor
 probability            float  that exactly these effects act, or that these and something unexplained do, 0 to 1; 1
     where there is no answer. gap_attribute has that of each effect
 leg                    int    the one leg or drive at fault, from 1 on; 0 for all or none
-where                  str    where the effects act, in words: sites, several in a row by the first and the last; of
-    several legs those at which the effect is not zero by its 95 % interval; empty where nothing acts
+where                  str    where the effects act, in words: sites, several in a row by the first and the last, of a
+    robot with driven bars the legs; of several legs those at which the effect is not zero by its 95 % interval; empty
+    where nothing acts
 confounded_with        str    what else may act, joined by a comma: effects, unexplained and none that are not in the
     verdict and have a probability above 0.05; empty where none
 groups                 str    effects that are confounded in this campaign, of which one acts, the most probable first,
