@@ -115,9 +115,10 @@ class _LeftByCalibration:
 
     def error(self, generator: np.random.Generator, draws: int) -> FloatArray:
         """Draws (b,) of the mean square of its error, for noise of unit variance per axis."""
-        counted = np.linalg.qr(self._basis[self._counted], mode="r")
-        made = counted @ generator.standard_normal((counted.shape[1], draws))
-        return np.asarray(3.0 * (made**2).sum(axis=0) / self._counted.sum())
+        # squares of independent combinations of its parameters
+        powers = np.linalg.eigvalsh(self._basis[self._counted].T @ self._basis[self._counted])
+        made = np.maximum(powers, 0.0) @ generator.standard_normal((len(powers), draws)) ** 2
+        return np.asarray(3.0 * made / self._counted.sum())
 
 
 def _parts(

@@ -90,7 +90,7 @@ def test_a_step_of_a_scale_is_no_noise_on_few_stops(size_mm):
     assert 0.5 * off < found.verdict["gap_after_rms_mm"] < 2.0 * off
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", [1, 2])
 def test_the_explained_fraction_counts_where_a_step_may_be_between_two_stops(seed):
     """The function that is fitted goes smoothly from one stop to the other; the scale does not."""
 

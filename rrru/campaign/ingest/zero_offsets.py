@@ -82,7 +82,7 @@ def _far_off(robot: Robot, driven: _Driven, frames: Callable[[Poses], "Framed"],
     As much may be an error of tool or links: a zero whose drive moves what is read on a small radius makes up for it.
     """
     with_all = frames(robot.solve(driven[0] + zeros, driven[1])).model_mm
-    sizes = np.abs(zeros) / [LOST[unit] for unit in robot.parts.units]
+    sizes: np.ndarray = np.abs(zeros) / np.array([LOST[unit] for unit in robot.parts.units])
     for k in np.flatnonzero(sizes):
         nominal = zeros * (np.arange(len(zeros)) != k)
         moved = frames(robot.solve(driven[0] + nominal, driven[1])).model_mm - with_all
