@@ -2,7 +2,8 @@
 
 Mean squares are those of positions on the robot. Effects and the unexplained part are drawn from the posterior over
 hypotheses and their coefficients, with the calibration's share taken out. Squares of parts and twice the products of
-confounded effects add up to the gap's mean square, except for the sampling error of the noise ("sampling").
+confounded effects, with the error of the calibration itself, are the gap: in every draw its shares add up to 1. What
+was measured differs from that by the products of errors and noise ("sampling"), which are no error of the robot.
 """
 
 from itertools import combinations
@@ -28,53 +29,56 @@ def budget(
     inference: InferenceResult, stated_mm: float | None, generator: np.random.Generator, draws: int
 ) -> pd.DataFrame:
     """Rows of `gap_budget` without the campaign; stated_mm: the instrument's noise per axis, None where unknown."""
-    squares, acting, products, fitted = _drawn(inference, generator, draws)
+    left = _LeftByCalibration(inference.evidence.linear.base, inference.problem.on_robot)
+    squares, acting, products = _drawn(inference, left, generator, draws)
     instrument_mm2, noise = _noise_parts(inference, stated_mm, generator, draws)
     residual = inference.problem.residual(inference.calibrated)
     instrument = float(instrument_mm2.mean())
-    gap = float((residual[inference.problem.on_robot] ** 2).sum(axis=1).mean()) - instrument
+    # the residuals have the share of the noise that the calibration leaves
+    measured = float((residual[inference.problem.on_robot] ** 2).sum(axis=1).mean()) - instrument * (1.0 - left.taken)
     posterior = inference.posterior
     unexplained = squares.pop(_UNEXPLAINED)
     rows = [(name, "effect", drawn, posterior.marginal(name)) for name, drawn in squares.items()]
     rows += [(name, name, *drawn) for name, drawn in noise.items()]
     rows.append((_UNEXPLAINED, _UNEXPLAINED, unexplained, posterior.probability_unexplained))
-    rows += [(" and ".join(pair), "covariance", drawn, np.nan) for pair, drawn in products.items()]
-    # small products are counted as sampling
-    least = OPTIONS.min_covariance_share * max(gap, 1e-12)
-    rows = [row for row in rows if row[1] != "covariance" or abs(row[2].mean()) > least]
-    known = sum(float(drawn.mean()) for *_, drawn, _ in rows)
-    calibration = instrument * fitted * np.ones(1)
-    rows.append(("sampling", "sampling", np.array([gap - known]), np.nan))
+    least = OPTIONS.min_covariance_share * max(measured, 1e-12)
+    large = {pair: drawn for pair, drawn in products.items() if abs(drawn.mean()) > least}
+    rows += [(" and ".join(pair), "covariance", drawn, np.nan) for pair, drawn in large.items()]
+    parts = np.sum([drawn for _, _, drawn, _ in rows], axis=0)
+    calibration = instrument / 3.0 * left.error(generator, draws)
+    rows.append(("sampling", "sampling", np.array([measured - parts.mean()]), np.nan))
     rows.append(("calibration", "calibration", calibration, np.nan))
-    total = gap + float(calibration[0])
+    whole = parts + calibration
     given = {name: acts for name, acts in acting.items() if posterior.marginal(name) >= OPTIONS.min_named_probability}
-    made = [_row(*row, total, given.get(row[0]) if row[1] == "effect" else None) for row in rows]
+    made = [_row(*row, whole, given.get(row[0]) if row[1] == "effect" else None) for row in rows]
     return pd.DataFrame(made, columns=COLUMNS)
 
 
 def _row(
-    part: str, kind: str, squares: FloatArray, probability: float, total: float, given: BoolArray | None = None
+    part: str, kind: str, squares: FloatArray, probability: float, whole: FloatArray, given: BoolArray | None = None
 ) -> tuple[str, str, float, float, float, float, float]:
-    """One row of draws (b,) of a mean square, which may be negative where it is a product.
+    """One row of draws (b,) of a mean square, which may be negative where it is a product, and of the gap (b,).
 
     given: draws (b,) that the interval is of, None for all. That of an effect that is probable enough for a name is
     that given that it acts: how probable that is has a column of its own.
     """
-    mean, counted = float(squares.mean()), squares if given is None else squares[given]
-    low, high = np.quantile(counted, OPTIONS.interval_quantiles) if len(counted) else (mean, mean)
-    share, least, most = (float(one / total if total > 0.0 else 0.0) for one in (mean, min(low, mean), max(high, mean)))
-    return part, kind, float(np.sign(mean) * np.sqrt(abs(mean))), share, least, most, float(probability)
+    mean, total = float(squares.mean()), float(whole.mean())
+    shares = squares / np.where(whole > 0.0, whole, np.inf)
+    counted = shares if given is None else shares[given]
+    share = mean / total if total > 0.0 else 0.0
+    low, high = np.quantile(counted, OPTIONS.interval_quantiles) if len(counted) else (share, share)
+    rms = float(np.sign(mean) * np.sqrt(abs(mean)))
+    return part, kind, rms, share, float(min(low, share)), float(max(high, share)), float(probability)
 
 
 def _drawn(
-    inference: InferenceResult, generator: np.random.Generator, draws: int
-) -> tuple[dict[str, FloatArray], dict[str, BoolArray], dict[tuple[str, str], FloatArray], float]:
+    inference: InferenceResult, left: "_LeftByCalibration", generator: np.random.Generator, draws: int
+) -> tuple[dict[str, FloatArray], dict[str, BoolArray], dict[tuple[str, str], FloatArray]]:
     """Draws (b,) of mean squares, of effects and of what is unexplained, by name, in which of them each acts, and draws
-    of products of two of them; the share of the noise that the calibration absorbs.
+    of products of two of them.
     """
     problem, evidence, posterior = inference.problem, inference.evidence, inference.posterior
     linear, lacks_fit = evidence.linear, inference.lacks_fit
-    left = _LeftByCalibration(linear.base, problem.on_robot)
     data, count = left.residual(linear.data.reshape(-1, 1)), int(problem.on_robot.sum())
     weights = posterior.weights.ravel()
     counts = np.bincount(generator.choice(len(weights), draws, p=weights / weights.sum()), minlength=len(weights))
@@ -98,7 +102,7 @@ def _drawn(
             beyond = data - sum(parts.values(), np.zeros((len(data), counts[number])))
             spare = 3.0 * problem.noise_mm**2 * (1.0 - left.taken)
             squares[_UNEXPLAINED][some] += np.maximum((beyond**2).sum(axis=0) / count - spare, 0.0)
-    return squares, acting, products, left.taken
+    return squares, acting, products
 
 
 class _LeftByCalibration:
@@ -115,6 +119,13 @@ class _LeftByCalibration:
     def residual(self, numbers: FloatArray) -> FloatArray:
         """Residuals (3n, k) at the readings that count, of numbers (3m, k) at all readings."""
         return numbers[self._counted] - self._basis[self._counted] @ (self._basis.T @ numbers)
+
+    def error(self, generator: np.random.Generator, draws: int) -> FloatArray:
+        """Draws (b,) of the mean square of its error, for noise of unit variance per axis."""
+        # squares of independent combinations of its parameters
+        powers = np.linalg.eigvalsh(self._basis[self._counted].T @ self._basis[self._counted])
+        made = np.maximum(powers, 0.0) @ generator.standard_normal((len(powers), draws)) ** 2
+        return np.asarray(3.0 * made / self._counted.sum())
 
 
 def _parts(

@@ -143,7 +143,10 @@ def diagnose(
     if why := why_no_answer(inference, robot.noise_mm):
         verdict, inference, ordered = without_answer(why), _without_effects(inference, settings.prior), ()
     begin(STEPS[2])
-    steps = shrink_steps(inference, [term for term, _ in ordered], generator, settings.draws)
+    terms = [term for term, _ in ordered]
+    steps = shrink_steps(inference, terms, generator, settings.draws)
+    jump_generator = stream(settings.seed, "gap jumps", robot.campaign)
+    steps = (*steps[:-1], _with_drawn_jumps(inference, steps[-1], terms, (jump_generator, settings.draws)))
     problem = inference.problem
     residual = problem.residual(inference.calibrated)
     budget_generator = stream(settings.seed, "gap budget", robot.campaign)
@@ -165,6 +168,20 @@ def diagnose(
     if details:
         tables |= details_of(inference, verdict, steps, residual, generator, settings.draws)
     return Diagnosis(row, tables, inference.state, inference, verdict)
+
+
+def _with_drawn_jumps(
+    inference: InferenceResult, last: ShrinkStep, terms: Sequence[EffectTerm], drawn: tuple[np.random.Generator, int]
+) -> ShrinkStep:
+    """The last ShrinkStep, whose draws have the mean error by jumps between stops, with that of drawn places of these.
+
+    drawn: generator and number of draws.
+    """
+    explained, level = 1.0 - inference.posterior.probability_unexplained, inference.level
+    strengths = inference.hypothesis.strengths_of(terms, level)
+    mean = inference.held_out.jumps_mm2(terms, strengths, level)
+    jumps = inference.held_out.drawn_jumps_mm2(terms, strengths, level, drawn)
+    return replace(last, moved_mm2=last.moved_mm2 + explained * (jumps - mean))
 
 
 def _findings(inference: InferenceResult) -> Iterator[str]:

@@ -68,7 +68,8 @@ def with_spectra(
             continue
         columns, roots = linear.columns[effect.name, 0].reshape(len(data), -1), effect.coordinates.roots
         of_one = effect.coordinates.of_one
-        likely = likeliest(data, _without(columns, basis), (roots, of_one), basis.shape[1])
+        step = one_step(data, basis, linear.drive, problem.motion.drive[problem.at]) if any(of_one) else -np.inf
+        likely = likeliest(data, _without(columns, basis), (roots, of_one), basis.shape[1], step)
         best, prior_scale, noise, err, steps = likely
         by_drive = _visible(columns, roots[best], prior_scale / noise)
         library[effect.name] = replace(_chosen(effect, by_drive, prior_scale, err), steps=steps)
@@ -314,12 +315,13 @@ def likeliest(
     columns: FloatArray,
     spectra: tuple[tuple[tuple[FloatArray, ...], ...], tuple[bool, ...]],
     fitted: int,
+    step: float = -np.inf,
 ) -> tuple[int, float, float, BoolArray, float]:
     """The likeliest spectrum of data (m,): its number, the factor of its sizes, the noise, which drives (K,) err, and
-    the probability that a spectrum of one drive alone made them, which has steps.
+    the probability that the function has steps, those of a spectrum of one drive alone or one.
 
     columns (m, c); spectra: `roots` and `of_one` as of `Coordinates`. All drives together and each one alone are tried,
-    whatever is likeliest counts. fitted: number of parameters fitted together with them.
+    whatever is likeliest counts. fitted: number of parameters fitted together with them; step: of `one_step`.
     """
     gram, moment, square = columns.T @ columns, columns.T @ data, float(data @ data)
     found = []
@@ -333,10 +335,36 @@ def likeliest(
             # each drive is as probable as another
             value -= (not its.all()) * np.log(len(by_drive))
             found.append((value, number, factor, noise, np.unique(drive[its])))
-    height, number, factor, noise, erring = max(found, key=lambda one: one[:2])
-    weight = np.exp([value - height for value, *_ in found])
-    steps = weight[[spectra[1][one] for _, one, *_ in found]].sum() / weight.sum()
+    _, number, factor, noise, erring = max(found, key=lambda one: one[:2])
+    values = np.array([*(value for value, *_ in found), step])
+    weight = np.exp(values - values.max())
+    steps = weight[[*(spectra[1][one] for _, one, *_ in found), True]].sum() / weight.sum()
     return number, factor, noise, np.isin(np.arange(len(spectra[0][number])), erring), float(steps)
+
+
+def one_step(data: FloatArray, basis: FloatArray, drive_effect: FloatArray, drive: FloatArray) -> float:
+    """Log likelihood of data (m,) under one step of one drive's error, up to the constant of `likeliest`.
+
+    Every drive and place of its range is equally probable; size and noise are the likeliest for each. A step explains E
+    of the sum of squares S of count numbers. Its likeliest signal is t = (count E - S) / (S - E) times the noise.
+    basis (m, b): columns that are fitted together with it; drive_effect (n, 3, K): derivative by the actuator values;
+    drive (n, K): these. No spectrum has a step as its typical function, since it is flat on both sides of it.
+    """
+    count, square, found = len(data) - basis.shape[1], float(data @ data), []
+    for response, value in zip(np.moveaxis(drive_effect, 2, 0), drive.T, strict=True):
+        order = np.argsort(value, kind="stable")
+        (ends,) = np.nonzero(np.diff(value[order]))
+        made = np.einsum("na,nab->nb", response, basis.reshape(*response.shape, -1))
+        rows = np.column_stack([(response**2).sum(axis=1), (response * data.reshape(response.shape)).sum(axis=1), made])
+        # sums over the readings beyond each place
+        size, moment, *taken = (rows[order].sum(axis=0) - np.cumsum(rows[order], axis=0)[ends]).T
+        free = size - np.sum(np.square(taken), axis=0)
+        explained = np.where(free > OPTIONS.min_free_wave_share * size, moment**2 / np.maximum(free, 1e-300), 0.0)
+        signal = np.maximum((count * explained - square) / np.maximum(square - explained, 1e-300), 0.0)
+        noise = (square - explained * signal / (1.0 + signal)) / count
+        width = np.diff(value[order])[ends] / max(np.ptp(value), 1e-300)
+        found.append(np.log(width) - 0.5 * count * np.log(noise) - 0.5 * np.log1p(signal))
+    return float(np.logaddexp.reduce(np.concatenate(found)) - np.log(len(found)))
 
 
 def _likeliest_factor(gram: FloatArray, moment: FloatArray, square: float, count: int) -> tuple[float, float, float]:

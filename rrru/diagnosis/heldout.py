@@ -7,6 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 from scipy.linalg import cho_solve, solve_triangular
+from scipy.special import ndtr, stdtrit
 
 from rrru.arrays import FloatArray, IntArray
 from rrru.campaign.noise import along_runs
@@ -169,10 +170,34 @@ class HeldOut:
         self, terms: Sequence[EffectTerm], prior_scales: Sequence[float] | FloatArray, level: int
     ) -> FloatArray:
         """Mean squared error (n,) of each reading over the drives' ranges by jumps of their functions between stops."""
-        linear, library, motion = self.evidence.linear, self.evidence.library, self.problem.motion
         result = np.zeros(len(self.problem))
+        for size_mm2, jumping in self._jumping(terms, prior_scales, level):
+            result += jumping.mean * size_mm2
+        return result
+
+    def drawn_jumps_mm2(
+        self,
+        terms: Sequence[EffectTerm],
+        prior_scales: Sequence[float] | FloatArray,
+        level: int,
+        drawn: tuple[np.random.Generator, int],
+    ) -> FloatArray:
+        """Draws (b, n) of `jumps_mm2`; drawn: generator and number of draws."""
+        generator, draws = drawn
+        result = np.zeros((draws, len(self.problem)))
+        for size_mm2, jumping in self._jumping(terms, prior_scales, level):
+            result += np.outer(jumping.drawn(generator, draws), size_mm2)
+        return result
+
+    def _jumping(
+        self, terms: Sequence[EffectTerm], prior_scales: Sequence[float] | FloatArray, level: int
+    ) -> Iterator[tuple[FloatArray, "_Jumping"]]:
+        """By drive whose function may jump: squares (n,) that a unit of its error makes at the readings, in mm2, and
+        the function.
+        """
+        linear, library, motion = self.evidence.linear, self.evidence.library, self.problem.motion
         if not any(library[term.effect].steps for term in terms):
-            return result
+            return
         start, mean = linear.base.shape[-1], whole_fit(*self._system(terms, prior_scales, level)).mean
         used = motion.drive[self.problem.used]
         for term, block in zip(terms, signatures(library, linear, terms), strict=True):
@@ -183,12 +208,13 @@ class HeldOut:
                 continue
             coordinates = spread(effect.coordinates, term.legs) @ of_term
             functions = enumerate(effect.along_drives(replace(motion, drive=used)))
-            for (k, function), value in zip(functions, over_range(used).T, strict=True):
-                own = effect.coordinates.legs == k + 1
-                before, after, share = jumps(value, used[:, k], function @ coordinates[own])
-                variance = effect.steps * ((after - before) ** 2 * share * (1.0 - share)).mean()
-                result += variance * (linear.drive[:, :, k] ** 2).sum(axis=1)
-        return result
+            between = effect.along_drives(replace(motion, drive=over_range(used)))
+            for (k, function), fitted, value in zip(functions, between, over_range(used).T, strict=True):
+                own = coordinates[effect.coordinates.legs == k + 1]
+                before, after, share = jumps(value, used[:, k], function @ own)
+                squares = (fitted @ own - before) ** 2, (fitted @ own - after) ** 2
+                way = np.searchsorted(np.unique(used[:, k]), value, side="right")
+                yield (linear.drive[:, :, k] ** 2).sum(axis=1), _Jumping(effect.steps, *squares, share, way)
 
     def gains(self, terms: Sequence[EffectTerm], prior_scales: Sequence[float] | FloatArray, level: int) -> list[float]:
         """Log predictive score that each of the terms adds to that of the others, at these prior scales.
@@ -269,6 +295,32 @@ class HeldOut:
         return np.asarray(noise.variance(waves, lengths(series)) + misfit * spectrum(waves)[:, None])
 
 
+@dataclass(frozen=True)
+class _Jumping:
+    """A fitted function at places (p,) over a drive's range, which jumps between two stops with a probability.
+
+    steps: that probability; before, after (p,): its squared errors at places before and beyond the jump; share (p,): of
+    the way between two stops at which each place is, number way (p,): the jump is before it with this probability.
+    """
+
+    steps: float
+    before: FloatArray
+    after: FloatArray
+    share: FloatArray
+    way: IntArray
+
+    @property
+    def mean(self) -> float:
+        """Expected mean square error over the range."""
+        return self.steps * float((self.share * self.after + (1.0 - self.share) * self.before).mean())
+
+    def drawn(self, generator: np.random.Generator, draws: int) -> FloatArray:
+        """Draws (b,) of the mean square error over the range, each with one place of the jump for every way."""
+        acts = generator.random(draws) < self.steps
+        place = generator.random((draws, int(self.way.max()) + 1))[:, self.way]
+        return np.asarray(acts * np.where(self.share > place, self.after, self.before).mean(axis=1))
+
+
 def within(run: IntArray, at: IntArray) -> IntArray:
     """Number (m,) from 0 on of the stop in its run (m,); at (m,): at which stop of the campaign each row was read."""
     result = np.empty(len(run), dtype=int)
@@ -277,11 +329,33 @@ def within(run: IntArray, at: IntArray) -> IntArray:
     return result
 
 
+def resampled_groups(problem: DiagnosisProblem) -> IntArray:
+    """Labels (m,) of the runs, or of stretches of five points where there are few runs, that are resampled as one."""
+    run = problem.run
+    if len(np.unique(run)) >= OPTIONS.min_resampled_runs:
+        return np.asarray(run)
+    return np.asarray(run * (len(run) + 1) + within(run, problem.stop) // OPTIONS.points_per_stretch)
+
+
+def resampled_quantiles(problem: DiagnosisProblem) -> tuple[float, float]:
+    """Quantiles of statistics of `resampled_rows` between which their 95 % interval is.
+
+    Resampling n groups makes the variance n / (n - 1) too small and knows no uncertainty of it. The quantiles are those
+    of the normal distribution at sqrt(n / (n - 1)) times the quantiles of Student's t of n - 1 degrees of freedom
+    (T. Hesterberg, What teachers should know about the bootstrap, The American Statistician 69, 2015, section 3.3).
+    """
+    count = len(np.unique(resampled_groups(problem)))
+    if count < 2:
+        return 0.0, 1.0
+    low, high = (
+        float(ndtr(np.sqrt(count / (count - 1.0)) * stdtrit(count - 1, one))) for one in OPTIONS.interval_quantiles
+    )
+    return low, high
+
+
 def resampled_rows(problem: DiagnosisProblem, generator: np.random.Generator, draws: int) -> IntArray:
-    """Rows (draws, m) of a problem resampled by runs, or by stretches of five points where there are few runs."""
-    block = run = problem.run
-    if len(np.unique(run)) < OPTIONS.min_resampled_runs:
-        block = run * (len(run) + 1) + within(run, problem.stop) // OPTIONS.points_per_stretch
+    """Rows (draws, m) of a problem resampled by `resampled_groups`."""
+    run, block = problem.run, resampled_groups(problem)
     groups = [np.flatnonzero(block == label) for label in dict.fromkeys(block.tolist())]
     result = np.empty((draws, len(run)), dtype=int)
     for k in range(draws):

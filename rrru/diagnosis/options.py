@@ -130,8 +130,8 @@ class DiagnosisOptions:
     min_rival_probability_ratio: float = 0.05
     # a cause, or a group, is named from this probability on: a false name costs as much as 2.3 missed ones; assumed
     min_named_probability: float = 0.7
-    # with something unexplained an effect that makes less of the gap, or without which less more than that remained, may
-    # be a part of that; the usual 5 %
+    # with something unexplained an effect that makes less of the gap, or without which what remains is larger by less,
+    # may be a part of that; the usual 5 %
     min_share_with_unexplained: float = 0.05
     # an effect that follows the variable of the remainder has to be so many times as large: a smaller one may be a part
     # of the remainder that has its form by chance; assumed

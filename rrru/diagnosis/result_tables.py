@@ -25,7 +25,7 @@ from rrru.diagnosis.verdict import NOT_TESTED, Verdict, label
 from rrru.effects.harmonic import is_phase
 from rrru.effects.protocol import Effect
 from rrru.estimation.intervals import QUANTILE_95
-from rrru.robots.drive_words import DriveWords, drive_words
+from rrru.robots.drive_words import LENGTH, DriveWords, drive_words
 
 # the table has columns for so many drives of either unit, whatever the robot
 _LEAST_DRIVES = 3
@@ -95,11 +95,14 @@ def _attribute_rows(inference: InferenceResult, verdict: Verdict) -> pd.DataFram
 def where(inference: InferenceResult, effects: Collection[str], numbers: pd.DataFrame) -> str:
     """Where the effects of a verdict act: of each its sites in words, several in a row by the first and the last.
 
-    Of an effect of several legs the sites of those at which it is not zero, see `acting_places`. numbers: rows of
+    Of an effect of several legs the sites of those at which it is not zero, see `acting_places`. Sites of an effect
+    before are not listed again. Where bars are driven, drives have their names of `drive_words`. numbers: rows of
     `gap_parameters`.
     """
     problem, words = inference.problem, drive_words(inference.problem.mechanism)
+    drives = dict(zip(words.names, words.all_names, strict=True)) if LENGTH in words.kinds else {}
     found: list[str] = []
+    listed: set[str] = set()
     for term in inference.hypothesis.terms:
         if term.effect not in effects:
             continue
@@ -109,8 +112,10 @@ def where(inference: InferenceResult, effects: Collection[str], numbers: pd.Data
             legs = np.unique(problem.library[term.effect].coordinates.legs).tolist()
             acting = sites(problem.library, problem.motion, term, [leg for leg in legs if words.place(leg) in places])
         every = sites(problem.library, problem.motion, replace(term, legs=EACH))
-        found += _ranges(every, acting or own)
-    return ", ".join(dict.fromkeys(found))
+        chosen = [site for site in acting or own if site not in listed]
+        listed |= {*chosen}
+        found += _ranges([drives.get(site, site) for site in every], [drives.get(site, site) for site in chosen])
+    return ", ".join(found)
 
 
 def _ranges(names: Sequence[str], chosen: Collection[str]) -> list[str]:

@@ -23,8 +23,9 @@ unnamed                str    names joined by + of possible effects that the cor
 probability            float  that exactly these effects act, or that these and something unexplained do, 0 to 1; 1
     where there is no answer. gap_attribute has that of each effect
 leg                    int    the one leg or drive at fault, from 1 on; 0 for all or none
-where                  str    where the effects act, in words: sites, several in a row by the first and the last; of
-    several legs those at which the effect is not zero by its 95 % interval; empty where nothing acts
+where                  str    where the effects act, in words: sites, several in a row by the first and the last, of a
+    robot with driven bars the legs; of several legs those at which the effect is not zero by its 95 % interval; empty
+    where nothing acts
 confounded_with        str    what else may act, joined by a comma: effects, unexplained and none that are not in the
     verdict and have a probability above 0.05; empty where none
 groups                 str    effects that are confounded in this campaign, of which one acts, the most probable first,
@@ -72,15 +73,15 @@ reason                 str    why {not measured, stale reading, outlier in the f
 points                 int    points left out
 
 ## gap_budget | tables/gap_budget.parquet | campaign part
-What the gap's mean square is made of. Shares add up to 1; calibration is no part of what is measured on fitted points
-and is added to their gap.
+What the gap's mean square is made of. Shares add up to 1 without that of sampling, which is no error of the robot;
+calibration is no part of what is measured on fitted points and is added to their gap.
 --
 campaign
 part                   str    effect, or kind; of a covariance both effects
 kind                   str    effect; scatter: what does not repeat, noise above the stated; runs: offsets between runs;
-    unexplained: systematic and predicted by nothing; covariance: of two confounded effects; sampling: of this draw of
-    the noise; calibration: uncertainty of its parameters {effect, scatter, runs, unexplained,
-    covariance, sampling, calibration}
+    unexplained: systematic and predicted by nothing; covariance: of two confounded effects; sampling: what was
+    measured minus the other parts, by this draw of the noise; calibration: uncertainty of its parameters
+    {effect, scatter, runs, unexplained, covariance, sampling, calibration}
 rms_mm                 float  root of its mean square, negative where that is
 share                  float  of the gap's mean square
 share_low              float  lower end, 95 %, from the posterior; of a cause that is probable enough for a name, given

@@ -84,7 +84,7 @@ def losses_without(inference: InferenceResult) -> dict[str, float]:
 
 
 def _gap_mm2(inference: InferenceResult, terms: Sequence[EffectTerm]) -> float:
-    """Mean square gap on left-out points with some terms of the hypothesis, less noise, zero where noise explains it."""
+    """Mean square gap on left-out points with some terms of the hypothesis, less noise, and at least zero."""
     hypothesis, level, problem = inference.hypothesis, inference.level, inference.problem
     prediction = inference.held_out.predict(terms, hypothesis.strengths_of(terms, level), level, uncertain=False)
     squares = (prediction.residual_mm[problem.on_robot] ** 2).sum(axis=1)

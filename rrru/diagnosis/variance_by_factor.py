@@ -9,7 +9,7 @@ from scipy.special import chdtri
 
 from rrru.arrays import FloatArray, IntArray
 from rrru.diagnosis.aliases import ObjectArray, Row
-from rrru.diagnosis.heldout import resampled_rows
+from rrru.diagnosis.heldout import resampled_quantiles, resampled_rows
 from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.problem import DiagnosisProblem
 from rrru.robots.drive_words import drive_words
@@ -31,11 +31,11 @@ def variance_by_factor(
 
     residual_mm (m, 3): readings minus calibrated model; drive (m, 3, K): derivative by the actuator values. Shares
     are of the mean square of positions on the robot, those of drives of all that was read, with the noise taken off;
-    their 95 % intervals come from resampled runs (stretches where there are fewer than ten).
+    their 95 % intervals come from resampled runs (stretches where there are fewer than ten), see `resampled_quantiles`.
     """
-    resampled = resampled_rows(problem, generator, draws)
+    resampled, ends = resampled_rows(problem, generator, draws), resampled_quantiles(problem)
     components = np.where(problem.on_robot[:, None], residual_mm**2, 0.0)
-    whole = _Whole(components.sum(axis=1), 3.0 * problem.on_robot.astype(float), problem.noise_mm**2, resampled)
+    whole = _Whole(components.sum(axis=1), 3.0 * problem.on_robot.astype(float), problem.noise_mm**2, resampled, ends)
     rows = []
     for name, levels in _levels(problem).items():
         for level in pd.unique(levels[(levels != "") & problem.on_robot]):
@@ -46,7 +46,7 @@ def variance_by_factor(
                 rows[-1] |= dict(zip(("x_mm", "y_mm", "z_mm"), centre.tolist(), strict=True))
     freedom = problem.on_robot.astype(float)
     rows.extend(whole.row("direction", axis, components[:, k], freedom) for k, axis in enumerate("xyz"))
-    rows.extend(_drive_rows(problem, residual_mm, drive, resampled))
+    rows.extend(_drive_rows(problem, residual_mm, drive, (resampled, ends)))
     return pd.DataFrame(rows).reindex(columns=[*_COLUMNS, *_MORE_COLUMNS])
 
 
@@ -68,14 +68,15 @@ def drive_errors(residual_mm: FloatArray, drive: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True)
 class _Whole:
-    """Sums of squares (n,) of so many components (n,), the variance of a component's noise, and resampled rows
-    (draws, n).
+    """Sums of squares (n,) of so many components (n,), the variance of a component's noise, resampled rows (draws, n),
+    and the quantiles of their statistics at the ends of a 95 % interval.
     """
 
     squares: FloatArray
     freedom: FloatArray
     variance: float
     resampled: IntArray
+    ends: tuple[float, float]
 
     def row(self, factor: str, level: str, part: FloatArray, freedom: FloatArray) -> Row:
         """One row: share of a part (n,) of the squares, of so many components (n,)."""
@@ -84,7 +85,7 @@ class _Whole:
         with np.errstate(divide="ignore", invalid="ignore"):
             drawn = np.where(drawn_total > 0.0, excess[self.resampled].sum(axis=1) / drawn_total, 0.0)
         share = excess.sum() / total.sum() if total.sum() > 0.0 else 0.0
-        low, high = np.quantile(np.clip(drawn, 0.0, 1.0), OPTIONS.interval_quantiles)
+        low, high = np.quantile(np.clip(drawn, 0.0, 1.0), self.ends)
         share = float(np.clip(share, 0.0, 1.0))
         count = int((freedom > 0.0).sum())
         return {
@@ -134,9 +135,13 @@ def _cells(position: FloatArray) -> ObjectArray:
 
 
 def _drive_rows(
-    problem: DiagnosisProblem, residual_mm: FloatArray, drive: FloatArray, resampled: IntArray
+    problem: DiagnosisProblem,
+    residual_mm: FloatArray,
+    drive: FloatArray,
+    draws: tuple[IntArray, tuple[float, float]],
 ) -> list[Row]:
-    """Rows of the factor drive: shares of the squared errors of the drives."""
+    """Rows of the factor drive: shares of the squared errors of the drives; draws: resampled rows, quantiles."""
+    resampled, ends = draws
     residual_mm, drive = problem.by_point(residual_mm), problem.by_point(drive)
     errors, number = drive_errors(residual_mm, drive), np.flatnonzero(problem.used)
     resampled = np.searchsorted(number, problem.at[resampled])
@@ -145,7 +150,7 @@ def _drive_rows(
     # a drive of another arm than the one that is read moves nothing; no drive moves a target fixed to the world
     scaled = np.divide(errors**2, noise, out=np.zeros_like(noise), where=noise > 0.0)
     moving = (noise > 0.0).astype(float)
-    whole, rows = _Whole(scaled.sum(axis=1), moving.sum(axis=1), 1.0, resampled), []
+    whole, rows = _Whole(scaled.sum(axis=1), moving.sum(axis=1), 1.0, resampled, ends), []
     names = drive_words(problem.mechanism).all_names
     for k, (name, unit) in enumerate(zip(names, problem.mechanism.parts.units, strict=True)):
         moved = np.linalg.norm(drive[:, :3, k] * errors[:, k, None], axis=1)

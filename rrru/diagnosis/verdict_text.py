@@ -3,7 +3,7 @@
 `rrru/pipeline/verdict.schema.yaml` is its schema. mm, rad; sizes are root mean squares of 3-D distances.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -231,13 +231,14 @@ def _places(numbers: Sequence[Facts]) -> str:
 def _group(names: list[str], tables: Mapping[str, pd.DataFrame], budget: Sequence[Facts]) -> dict[str, Any]:
     """Facts of a group of confounded causes."""
     causes = tables["gap_attribute"].set_index("effect").loc[names]
-    shares = {part["part"]: part["share"] for part in budget if part["kind"] == "effect"}
+    # they exclude each other, or nearly so
+    parts = [part for part in budget if part["kind"] == "effect" and part["part"] in names]
     return {
         "names": names,
         "probabilities": [_clipped(float(one)) for one in causes["probability"]],
         "probability": _clipped(float(causes["group_probability"].iloc[0])),
-        # they exclude each other, or nearly so
-        "share": sum(shares.get(name, 0.0) for name in names),
+        "rms_mm": float(np.linalg.norm([part["rms_mm"] for part in parts])),
+        "share": sum(part["share"] for part in parts),
     }
 
 
@@ -269,16 +270,13 @@ def _causes(facts: Facts) -> list[str]:
     with_shares = _shares_are_determined(facts)
     groups = {group["names"][0]: group for group in facts["groups"]}
     single = [effect for effect in facts["effects"] if effect["name"] not in groups]
-    small = [effect["name"] for effect in single if with_shares and _is_small(effect, facts)]
-    if len(small) == len(facts["effects"]):
-        # where all causes are small each has a sentence
-        small = []
-    said = [_by_share(facts, groups, len(small))] if with_shares and len(facts["effects"]) > 1 else []
+    small = _small(facts, groups) if with_shares else set()
+    said = [_by_share(facts, groups, small)] if with_shares and len(facts["effects"]) > 1 else []
     said = ([_UNSURE] if any(effect["decision"] == POSSIBLE for effect in single) else []) + said
     single = [effect for effect in single if effect["name"] not in small]
     of_gap = [" of the gap"] + [""] * len(single)
     said += [_cause(effect, of, with_shares, facts) for effect, of in zip(single, of_gap, strict=False)]
-    said += [_of_group(group, with_shares) for group in groups.values()]
+    said += [_of_group(group, with_shares) for name, group in groups.items() if name not in small]
     if not with_shares and said:
         small = facts["gap_rms_mm"] <= facts["noise_rms_mm"]
         why = "The gap is too small relative to the noise" if small else "The effects are confounded with each other"
@@ -333,19 +331,27 @@ def _looks_like(rows: Sequence[Facts]) -> list[str]:
     ]
 
 
-def _is_small(effect: Facts, facts: Facts) -> bool:
-    """Whether an effect's part of the gap is too small for a sentence."""
-    small = (effect["rms_mm"] or 0.0) < OPTIONS.min_cause_per_noise * facts["noise_rms_mm"]
-    return effect["share"] is not None and (small or effect["share"] < OPTIONS.min_cause_share)
+def _small(facts: Facts, groups: Mapping[str, Facts]) -> set[str]:
+    """Effects, of a group the first, whose part of the gap is too small for a sentence; none where all are."""
+    parts = {effect["name"]: groups.get(effect["name"], effect) for effect in facts["effects"]}
+    least_mm = OPTIONS.min_cause_per_noise * facts["noise_rms_mm"]
+    small = {
+        name
+        for name, part in parts.items()
+        if part["share"] is not None and (part["rms_mm"] < least_mm or part["share"] < OPTIONS.min_cause_share)
+    }
+    return small if len(small) < len(parts) else set()
 
 
-def _by_share(facts: Facts, groups: Mapping[str, Facts], small: int) -> str:
-    """All causes in a line, each with its share, the small ones of so many counted."""
+def _by_share(facts: Facts, groups: Mapping[str, Facts], small: Collection[str]) -> str:
+    """All causes in a line, each with its share, the small ones counted."""
     listed = []
     for effect in facts["effects"]:
+        if effect["name"] in small:
+            continue
         if group := groups.get(effect["name"]):
             listed.append((group["share"], " or ".join(map(readable, group["names"]))))
-        elif not (small and _is_small(effect, facts)):
+        else:
             known = effect["share"] is None or is_determined(effect)
             name = readable(effect["name"])
             listed.append((effect["share"] or 0.0, name if known else f"{name} (share not determined)"))
@@ -353,7 +359,7 @@ def _by_share(facts: Facts, groups: Mapping[str, Facts], small: int) -> str:
         name if name.endswith(")") else f"{name} {small_percent(share)}"
         for share, name in sorted(listed, key=lambda one: (-one[0], one[1]))
     ]
-    words += [f"{small} small one{'s' if small > 1 else ''}"] * bool(small)
+    words += [f"{len(small)} small one{'s' if len(small) > 1 else ''}"] * bool(small)
     return f"Causes by their share of the gap: {', '.join(words)}."
 
 

@@ -73,8 +73,8 @@ _RING: style.Look = {
 
 # parts of the budget by kind
 _KIND_COLOURS = {"scatter": "#aaaaaa", "runs": "#cccccc", "unexplained": "#d55e00", "calibration": "#eeeeee"}
-# what completes the parts to the whole: products of two of them, and what the draw of the noise leaves
-_RESTS = {"covariance": "/////", "sampling": "....."}
+# of the products of two parts, which complete the parts to the whole
+_HATCH = "/////"
 _EFFECT_COLOURS = (style.BLUE, "#56b4e9", "#009e73", "#cc79a7", "#f0e442", "#0072b2")
 # parts of a smaller share are not drawn, or not named; names stand inside of parts wider than this for each letter
 _LEAST_PART, _NAMED_PART, _LETTER_SHARE = 0.01, 0.03, 0.0125
@@ -93,12 +93,11 @@ class _DriveNames(TypedDict):
 def gap(tables: Tables, options: Options) -> Figure:
     """The gap between the calibrated model and the measurement. On top its budget: the share of its mean square that
     each effect makes, that does not repeat, and that nothing explains, with 95 % intervals as thin lines; covariances
-    of confounded parts (hatched) and the sampling of the noise (dotted) complete them to 1. The probability in the
-    headline is that of exactly these causes, of a group alone that one of it acts. (a) Where: measured minus
-    calibrated model at the points from above and from the side, magnified as stated. (b) Why: probability of every
-    effect, those of the verdict in colour, those of a group hatched. (c) Remaining gap: at points that the fit
-    has not used, under the calibrated and the corrected model, with the explained fraction of its mean square.
-    (d) Residual of every point.
+    of confounded parts (hatched) complete them to 1. The probability in the headline is that of exactly these causes,
+    of a group alone that one of it acts. (a) Where: measured minus calibrated model at the points from above and from
+    the side, magnified as stated. (b) Why: probability of every effect, those of the verdict in colour, those of a
+    group hatched. (c) Remaining gap: at points that the fit has not used, under the calibrated and the corrected model,
+    with the explained fraction of its mean square. (d) Residual of every point.
     """
     campaign, frames = options["campaign"], {}
     for name in ("gap_verdicts", "gap_attribute", "gap_shrink", "gap_budget"):
@@ -453,17 +452,18 @@ def _thinned(points: pd.DataFrame) -> pd.DataFrame:
 def draw_budget(axes: Axes, rows: pd.DataFrame) -> None:
     """Parts of `gap_budget` one after the other: effects by share, then what does not repeat, runs and the unknown.
 
-    A thin line in each part is its 95 % interval, counted from the part's beginning. Covariances of parts (hatched) and
-    the sampling of the noise (dotted) complete them to 1; negative ones extend to the left of 0.
+    A thin line in each part is its 95 % interval, counted from the part's beginning. Covariances of parts (hatched)
+    complete them to 1; negative ones extend to the left of 0.
     """
     shown = rows[(rows["share"] > _LEAST_PART) & ~rows["kind"].isin(["covariance", "sampling"])]
     effects = shown[shown["kind"] == "effect"].sort_values("share", ascending=False)
     others = [part for kind in _KIND_COLOURS for part in shown[shown["kind"] == kind].to_dict("records")]
-    rests = rows[rows["kind"].isin([*_RESTS])].groupby("kind")["share"].sum()
-    limits = min(rests[rests < 0.0].sum(), 0.0), max(shown["share"].sum() + rests[rests > 0.0].sum(), 1.0)
+    covariance = float(rows.loc[rows["kind"] == "covariance", "share"].sum())
+    limits = min(covariance, 0.0), max(shown["share"].sum() + max(covariance, 0.0), 1.0)
     # where names above and below the bar end so far
     taken = dict.fromkeys(_NAME_HEIGHTS, limits[0])
-    least = _rests(axes, rests[rests < 0.0], 0.0, limits, taken)
+    if covariance < 0.0:
+        _covariance(axes, covariance, 0.0, limits, taken)
     start = 0.0
     for number, part in enumerate([*effects.to_dict("records"), *others]):
         colour = _KIND_COLOURS.get(part["kind"], _EFFECT_COLOURS[number % len(_EFFECT_COLOURS)])
@@ -479,8 +479,9 @@ def draw_budget(axes: Axes, rows: pd.DataFrame) -> None:
         elif part["share"] > _NAMED_PART:
             _name(axes, text, middle, limits, taken)
         start += part["share"]
-    most = _rests(axes, rests[rests > 0.0], start, limits, taken)
-    axes.set(xlim=(min(least, 0.0), max(start, most, 1.0)), ylim=(-0.75, 0.75), yticks=[])
+    if covariance > 0.0:
+        _covariance(axes, covariance, start, limits, taken)
+    axes.set(xlim=limits, ylim=(-0.75, 0.75), yticks=[])
     axes.set(xlabel="share of the gap's mean square", ylabel="budget")
     for side in ("left", "right", "top"):
         axes.spines[side].set_visible(False)
@@ -501,16 +502,12 @@ def _name(axes: Axes, text: str, middle: float, limits: _Limits, taken: dict[flo
     axes.text(left, height, text, ha="left", va="bottom" if height > 0.0 else "top", fontsize=7.0, in_layout=False)
 
 
-def _rests(axes: Axes, shares: pd.Series, start: float, limits: _Limits, taken: dict[float, float]) -> float:
-    """Draw covariances and sampling of one sign, shares by kind, as one part each from `start` on; returns the end."""
-    for kind in _RESTS:
-        share = float(shares.get(kind, 0.0))
-        if abs(share) <= _LEAST_PART:
-            continue
-        look: style.Look = {"facecolor": "white", "edgecolor": "#777777", "hatch": _RESTS[kind], "linewidth": 0.6}
-        axes.barh(0.0, share, left=start, height=0.6, **look)
-        if abs(share) > _NAMED_PART:
-            text = f"{kind} {100.0 * share:.0f} %".replace("-", "\N{MINUS SIGN}")
-            _name(axes, text, start + 0.5 * share, limits, taken)
-        start += share
-    return start
+def _covariance(axes: Axes, share: float, start: float, limits: _Limits, taken: dict[float, float]) -> None:
+    """Draw the covariances of all parts, whose shares sum up to `share`, as one part from `start` on."""
+    if abs(share) <= _LEAST_PART:
+        return
+    look: style.Look = {"facecolor": "white", "edgecolor": "#777777", "hatch": _HATCH, "linewidth": 0.6}
+    axes.barh(0.0, share, left=start, height=0.6, **look)
+    if abs(share) > _NAMED_PART:
+        text = f"covariance {100.0 * share:.0f} %".replace("-", "\N{MINUS SIGN}")
+        _name(axes, text, start + 0.5 * share, limits, taken)

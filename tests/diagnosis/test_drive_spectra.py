@@ -1,12 +1,13 @@
 """Waves and rough functions of the drives' angles in what a calibration leaves of a six-axis arm."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
 
 from rrru.diagnosis.calibrate import calibrate
-from rrru.diagnosis.drive_spectra import amplitudes, jumps, likeliest, pursue
+from rrru.diagnosis.drive_spectra import _likeliest_factor, amplitudes, jumps, likeliest, one_step, pursue
 from rrru.effects.drive_error_function import ORDERS
 from rrru.effects.library import find
 from tests.diagnosis import arms
@@ -179,6 +180,27 @@ def test_one_drive_alone_has_the_size_that_it_has():
         )
         factors.append(factor)
     assert np.median(factors) == pytest.approx(3.0, rel=0.3)
+
+
+def test_one_step_has_the_likelihood_of_its_column_at_every_place():
+    generator, count = np.random.default_rng(5), 14
+    effect, drive = generator.standard_normal((count, 3, 2)), generator.uniform(0.0, 5.0, (count, 2))
+    drive[3] = drive[4]
+    basis, _ = np.linalg.qr(generator.standard_normal((3 * count, 4)))
+    data = (effect[..., 0] * (drive[:, :1] > 2.0)).ravel() + 0.1 * generator.standard_normal(3 * count)
+    data = data - basis @ (basis.T @ data)
+    terms = []
+    for k in range(2):
+        at = np.unique(drive[:, k])
+        for low, high in pairwise(at):
+            column = (effect[..., k] * (drive[:, k] > 0.5 * (low + high))[:, None]).ravel()
+            column = column - basis @ (basis.T @ column)
+            value, *_ = _likeliest_factor(
+                np.array([[column @ column]]), np.array([column @ data]), data @ data, 3 * count - 4
+            )
+            terms.append(value + np.log((high - low) / np.ptp(at) / 2.0))
+    assert one_step(data, basis, effect, drive) == pytest.approx(np.logaddexp.reduce(terms), abs=1e-3)
+    assert one_step(data, basis, effect, 0.0 * drive) == -np.inf
 
 
 def test_an_injected_wave_has_its_amplitude():

@@ -9,10 +9,10 @@ from rrru.kinematics.dynamics import Masses
 from tests.diagnosis.gantry import GANTRY, NOISE_MM, campaign, stops
 
 
-def _diagnosed(frame, without=()):
+def _diagnosed(frame, without=(), draws=10):
     """Verdict, and value and standard error by parameter."""
     known = MeasuredRobot(GANTRY, Masses(0.0, 0.0, 0.0), NOISE_MM, "gantry")
-    settings = GapSettings(draws=10)
+    settings = GapSettings(draws=draws)
     for name in without:
         settings = settings.without(name)
     found = diagnose(frame, known, settings, details=False)
@@ -88,6 +88,21 @@ def test_a_step_of_a_scale_is_no_noise_on_few_stops(size_mm):
     # what remains at new values of the drive
     off = np.sqrt(((function["error"] - true + true.mean()) ** 2).mean())
     assert 0.5 * off < found.verdict["gap_after_rms_mm"] < 2.0 * off
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_the_explained_fraction_counts_where_a_step_may_be_between_two_stops(seed):
+    """The function that is fitted goes smoothly from one stop to the other; the scale does not."""
+
+    def joined(way):
+        return way + 0.2 * (way > [600.0, np.inf, np.inf])
+
+    found, *_ = _diagnosed(stops(joined, count=80, seed=seed), draws=200)
+    assert (found.verdict["effects"], found.verdict["leg"]) == ("drive_error_function", 1)
+    function = found.tables["gap_drive_functions"].query("drive == 1")
+    true = 0.2 * (function["drive_value"] > 600.0)
+    share = 1.0 - ((function["error"] - true + true.mean()) ** 2).mean() / true.var()
+    assert found.verdict["share_closed_low"] <= share <= found.verdict["share_closed_high"]
 
 
 def test_a_large_step_of_a_scale_is_no_lead_error_in_addition():

@@ -1,12 +1,20 @@
 """Tables behind a verdict."""
 
+from types import SimpleNamespace
+
+import numpy as np
+import pandas as pd
+
 from rrru.diagnosis.diagnose import MeasuredRobot, diagnose
-from rrru.diagnosis.result_tables import acting_places, places_of
+from rrru.diagnosis.result_tables import acting_places, places_of, where
 from rrru.diagnosis.settings import GapSettings
-from rrru.effects.library import library
+from rrru.diagnosis.terms import EffectTerm
+from rrru.effects.library import find, library
+from rrru.effects.motion import Course, make_motion
 from rrru.pipeline.read_config import read_config
 from rrru.robots.catalogue import make_mechanism
 from rrru.robots.drive_words import drive_words
+from rrru.robots.hexapod import hexapod
 from tests.diagnosis.campaigns import MASSES, NOISE_MM, ROBOT, active, measure
 
 
@@ -39,6 +47,24 @@ def test_a_cause_acts_at_the_places_at_which_one_of_its_numbers_is_not_zero():
     assert acting_places([sizes[0] | {"low_95": 1.2e-9}, sizes[1] | {"low_95": 1.8e-24}]) == ["at joint 1"]
     # all where none is beyond
     assert acting_places(many) == ["at joint 1"]
+
+
+def test_legs_whose_bars_are_driven_are_named_once_and_as_in_sentences():
+    angle = np.radians([0.0, 20.0, 120.0, 140.0, 240.0, 260.0])
+    ring = 300.0 * np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=1)
+    robot = hexapod(ring, np.roll(ring, 1, axis=0), 400.0, 80.0)
+    way, nothing = np.full((1, 6), 5.0), np.full((1, 6), np.nan)
+    course = Course(
+        robot.forward(way), way, way, np.arange(1), nothing[:, 0], nothing[:, :3], nothing[:, :3], nothing[:, 0]
+    )
+    names = ("lead_error", "drive_error_function")
+    effects = {name: find(name, robot) for name in names}
+    problem = SimpleNamespace(mechanism=robot, library=effects, motion=make_motion(robot, MASSES, course))
+    terms = [EffectTerm("lead_error", 0, (3, 5, 6)), EffectTerm("drive_error_function", 0, 5)]
+    acting = [("lead_error", f"in leg {k}", 1e-3) for k in (3, 5, 6)] + [("drive_error_function", "in leg 5", 1e-3)]
+    numbers = pd.DataFrame([{"effect": name} | _number("size", place, size, 1e-5) for name, place, size in acting])
+    inference = SimpleNamespace(problem=problem, hypothesis=SimpleNamespace(terms=terms))
+    assert where(inference, names, numbers) == "leg 3, leg 5 to leg 6"
 
 
 def test_the_table_names_the_sites_at_which_an_effect_is_not_zero():

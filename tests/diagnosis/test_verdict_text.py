@@ -226,6 +226,18 @@ def test_confounded_causes_are_one_sentence_with_their_probabilities():
     jsonschema.validate(json.loads(json.dumps(facts_of)), SCHEMA)
 
 
+def test_a_small_group_is_counted_and_has_no_sentence():
+    causes = synthetic_gap.gap_attribute(CAMPAIGN)
+    grouped = causes["effect"].isin(["backlash", "servo_lag"])
+    causes.loc[grouped, ["decision", "group_probability"]] = "group", 0.97
+    budget = synthetic_gap.gap_budget(CAMPAIGN)
+    budget.loc[budget["part"] == "backlash", "share"] = 0.009
+    answer = answered(budget, effects="link_flexure+backlash", groups="backlash | servo_lag", causes=causes)
+    assert "Causes by their share of the gap: link flexure 60 %, 1 small one." in answer["sentences"]
+    assert not any("One of these acts" in one for one in answer["sentences"])
+    jsonschema.validate(json.loads(json.dumps(answer)), SCHEMA)
+
+
 @pytest.mark.parametrize(("share", "rms"), [(0.009, 0.3), (0.5, 0.009)])
 def test_a_small_cause_is_counted_and_has_no_sentence(share, rms):
     budget = synthetic_gap.gap_budget(CAMPAIGN)

@@ -68,7 +68,7 @@ def gap_budget(campaign):
     shares = {"link_flexure": 0.6, "backlash": 0.2, "scatter": 0.1, "runs": 0.0, "unexplained": 0.05}
     kinds = {name: name if name in ("scatter", "runs", "unexplained") else "effect" for name in shares}
     shares["link_flexure and backlash"], kinds["link_flexure and backlash"] = 0.04, "covariance"
-    shares |= {"sampling": 0.005, "calibration": 0.005}
+    shares |= {"sampling": 0.02, "calibration": 0.01}
     rows = [
         {"part": name, "kind": kinds.get(name, name), "rms_mm": np.sqrt(share) * 0.37, "share": share}
         for name, share in shares.items()

@@ -67,7 +67,7 @@ def _with_file(folder, **verdict):
 
 
 def test_errors_of_a_corrected_file_are_next_to_its_link(folder):
-    remains = "this URDF holds the geometry only and not backlash: 0.54 mm rms remain; use corrected_drives"
+    remains = "this URDF holds the geometry only and not backlash: 0.54 mm rms remain; use corrected_drives.parquet"
     text = _with_file(
         folder, file_error_mm=0.31, file_error_fresh_mm=0.54, file_remainder=remains, not_in_model="backlash"
     )

@@ -200,7 +200,7 @@ class GrossFile:
         world, right = np.zeros(len(at), dtype=bool), np.ones(len(at), dtype=bool)
         frames = Frames(self.measured_mm[at], names, self.place_mm[self.target[at]], world, right, True)
         seen = Readings(frames.seen_mm, names, frames.place_mm, on_world=world)
-        zeros, _ = found_zeros(self.robot, (values, self._guess(values, at)), seen, frames.framed)
+        zeros, *_ = found_zeros(self.robot, (values, self._guess(values, at)), seen, frames.framed)
         return replace(self, drive=self.drive + zeros).hypothesis(self.given)
 
     def spread_mm(self) -> float:

@@ -17,7 +17,7 @@ from rrru.campaign.ingest.gross_advice import place_words
 from rrru.campaign.ingest.orientations import other_readings
 from rrru.campaign.ingest.outliers import strays
 from rrru.campaign.ingest.sheet import MEASURED, TURNS, Sheet, position_text
-from rrru.campaign.ingest.zero_offsets import LARGE, LOST, found_zeros
+from rrru.campaign.ingest.zero_offsets import LARGE, found_zeros
 from rrru.campaign.target_registration import axes_by_turning
 from rrru.kinematics.chain import Poses
 from rrru.kinematics.readings import Readings
@@ -107,7 +107,8 @@ def target_placement(sheet: Sheet) -> TargetPlacement | None:
     if not poses.closed.all():
         sheet.refuse_now(None, f"{int((~poses.closed).sum())} poses that the nominal robot cannot take", "known poses")
     frames, notes = _frames(sheet, named)
-    zeros, lost = _zeros(sheet, frames, command) if driven else (np.zeros(len(sheet.drives)), False)
+    nothing = np.zeros(len(sheet.drives))
+    zeros, far, lost = _zeros(sheet, frames, command) if driven else (nothing, nothing, False)
     if not (named or zeros.any()):
         return None
     if zeros.any():
@@ -116,7 +117,7 @@ def target_placement(sheet: Sheet) -> TargetPlacement | None:
     left_mm = frames.framed(poses, fitted).off_mm
     if zeros.any():
         _refuse_places(sheet, left_mm, lost)
-        notes += _lost_zero_notes(sheet, zeros, left_mm) if lost else ()
+        notes += _lost_zero_notes(sheet, (zeros, far), left_mm) if lost else ()
     free = ~frames.known & ~frames.on_world
     if registered and free.all() and np.ptp(poses.turn, axis=0).max() < _SAME_ORIENTATION:
         # for a platform that never turns they are confounded with the frame's shift: their mean is set to the tool
@@ -158,8 +159,8 @@ def _frames(sheet: Sheet, named: bool) -> tuple[Frames, tuple[str, ...]]:
     return Frames(seen, names, stated, on_world, right, sheet.spec.frame == "register"), notes
 
 
-def _zeros(sheet: Sheet, frames: Frames, command: np.ndarray) -> tuple[np.ndarray, bool]:
-    """Zero offsets (K,) of the drives in rad or mm, and whether zeros are lost: `rrru.campaign.ingest.zero_offsets`."""
+def _zeros(sheet: Sheet, frames: Frames, command: np.ndarray) -> tuple[np.ndarray, np.ndarray, bool]:
+    """Zero offsets (K,) of the drives in rad or mm, how far they are off, and whether zeros are lost: `found_zeros`."""
     chosen = np.flatnonzero(frames.framing)
     if len(chosen) > _MAX_ROWS:
         chosen = np.sort(np.random.default_rng(0).choice(chosen, _MAX_ROWS, replace=False))
@@ -217,20 +218,22 @@ def _places(sheet: Sheet, max_mm: float) -> dict[str, np.ndarray]:
     return {name: found.place_mm[names == name][0] for name in dict.fromkeys(names.tolist())}
 
 
-def _lost_zero_notes(sheet: Sheet, zeros: np.ndarray, left_mm: float) -> tuple[str, ...]:
-    """Notes on lost zeros (K,) of the drives, with which the nominal robot is left_mm off in the median."""
-    parts = sheet.mechanism.parts
-    shares = np.abs(zeros) / [LOST[unit] for unit in parts.units]
-    worst = int(shares.argmax())
-    drive = parts.drives[worst]
+def _lost_zero_notes(sheet: Sheet, found: tuple[np.ndarray, np.ndarray], left_mm: float) -> tuple[str, ...]:
+    """Notes on lost zeros (K,) of the drives, with which the nominal robot is left_mm off in the median.
+
+    found: the zeros and how far they are off over what is lost.
+    """
+    zeros, far = found
+    worst = int(far.argmax())
+    drive = sheet.mechanism.parts.drives[worst]
     most = f"{np.degrees(zeros[worst]):.3g} degrees" if drive.unit == "rad" else f"{zeros[worst]:.3g} mm"
     # none is that far off where only the start from the nominal zeros fails
-    count = max(int((shares >= 1.0).sum()), 1)
+    count = max(int((far > 1.0).sum()), 1)
     lost = f"zeros of {count} drives are" if count > 1 else "the zero of 1 drive is"
-    found = f"found with the frame, fitted by the calibration, {left_mm:.2g} mm remain in the median"
+    how = f"found with the frame, fitted by the calibration, {left_mm:.2g} mm remain in the median"
     places = places_instead(sheet, _AS_GOOD * left_mm)
     instead = f"{places}, or `robot` is another one" if places else "`robot` is another one or a stated place is wrong"
-    return (f"{lost} lost, by {most} at {drive.site}: {found}; if the drives are referenced, {instead}",)
+    return (f"{lost} lost, by {most} at {drive.site}: {how}; if the drives are referenced, {instead}",)
 
 
 def check_turned(sheet: Sheet) -> None:

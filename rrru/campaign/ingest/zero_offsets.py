@@ -44,10 +44,11 @@ _LEAST = 1e-2
 
 def found_zeros(
     robot: Robot, driven: _Driven, seen: Readings, frames: Callable[[Poses], "Framed"]
-) -> tuple[np.ndarray, bool]:
+) -> tuple[np.ndarray, np.ndarray, bool]:
     """Zero offsets (K,) of the actuator values that explain the residual of the frames; zero where they do not.
 
-    And whether they are lost: the nominal zeros are no start that leads to them, or one is off by more than LOST.
+    And how far they are off over LOST (K,), see `_far_off`, and whether they are lost: the nominal zeros are no start
+    that leads to them, or one is off by more than LOST.
 
     driven: actuator values (n, K) and nominal positions (n, 3); seen: Readings in the instrument's frame; frames: from
     Poses to a Framed.
@@ -55,7 +56,7 @@ def found_zeros(
     units, nothing = robot.parts.units, np.zeros(len(robot.parts.drives))
     before = _off(robot, driven, frames, nothing)
     if before <= _MAY_BE * robot.size_mm:
-        return nothing, False
+        return nothing, nothing, False
     generator, best, least, first_left = np.random.default_rng(0), nothing, before, np.inf
     spread = np.array([_SPREAD[unit] for unit in units])
     for start in range(_STARTS):
@@ -69,10 +70,25 @@ def found_zeros(
         if least <= max(_ENOUGH * before, _LOST * robot.size_mm):
             break
     if least >= _EXPLAINED * before:
-        return nothing, False
-    far = (np.abs(best) > [LOST[unit] for unit in units]).any()
+        return nothing, nothing, False
+    far = _far_off(robot, driven, frames, best)
     # several starts end at the same zeros to rounding
-    return best, bool(far or first_left > _SAME * least)
+    return best, far, bool((far > 1.0).any() or first_left > _SAME * least)
+
+
+def _far_off(robot: Robot, driven: _Driven, frames: Callable[[Poses], "Framed"], zeros: np.ndarray) -> np.ndarray:
+    """Sizes (K,) of zero offsets (K,) over LOST, 0 for those that move what is read by less than LARGE in mm.
+
+    As much may be an error of tool or links: a zero whose drive moves what is read on a small radius makes up for it.
+    """
+    with_all = frames(robot.solve(driven[0] + zeros, driven[1])).model_mm
+    sizes: np.ndarray = np.abs(zeros) / np.array([LOST[unit] for unit in robot.parts.units])
+    for k in np.flatnonzero(sizes):
+        nominal = zeros * (np.arange(len(zeros)) != k)
+        moved = frames(robot.solve(driven[0] + nominal, driven[1])).model_mm - with_all
+        if np.sqrt((moved**2).sum(axis=1).mean()) < LARGE["mm"]:
+            sizes[k] = 0.0
+    return sizes
 
 
 @dataclass(frozen=True)

@@ -39,6 +39,7 @@ from rrru.seeds import stream
 from rrru.simulation.mujoco_robot import MujocoRobot
 from rrru.store.atomic_write import write_text
 
+_USE_DRIVES = "use the drive values of corrected_drives.parquet, which is in the folder of this file"
 # fields of a Motion that have no row for each point
 _WITHOUT_ROWS = ("robot", "path_drive", "load_slopes")
 
@@ -107,10 +108,10 @@ def _remainder(
     if written.lacking or of_weight:
         names = ", ".join([*map(readable, written.lacking), *(f"that {note}" for note in of_weight)])
         size = f": {expected:.2g} mm rms remain {_conditions(inference.problem)}" if np.isfinite(expected) else ""
-        return f"this {_holds(written)} and not {names}{size}; use corrected_drives"
+        return f"this {_holds(written)} and not {names}{size}; {_USE_DRIVES}"
     if not left > OPTIONS.max_file_remainder_ratio * whole:
         return ""
-    return f"this file leaves {left:.2g} mm rms at the readings, the diagnosis {whole:.2g} mm; use corrected_drives"
+    return f"this file leaves {left:.2g} mm rms at the readings, the diagnosis {whole:.2g} mm; {_USE_DRIVES}"
 
 
 def _conditions(problem: DiagnosisProblem) -> str:

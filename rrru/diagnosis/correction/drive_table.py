@@ -1,6 +1,7 @@
 """Compensation table: drive values that bring the robot, as diagnosed, to the commanded positions. mm and rad.
 
-The grid fills the box about the measured points as far as one of these is near. It is the only correction where no
+The grid fills the box about the measured points as far as one of these is near, and where an error is a function of
+drives' values as far as these were read. It is the only correction where no
 model file can hold what was found. The robot is at rest, as warm as at the campaign's end.
 """
 
@@ -20,6 +21,8 @@ from rrru.kinematics.dynamics import Masses
 from rrru.kinematics.inverse import inverse_kinematics
 from rrru.kinematics.robot import Robot
 
+# of drive values, in rad and in mm
+_ROUNDING = 1e-9
 # how far away the drives come from, longer than any backlash
 _APPROACH = {"rad": OPTIONS.approach_distance_rad, "mm": OPTIONS.approach_distance_mm}
 
@@ -36,6 +39,11 @@ def corrected_drives(inference: InferenceResult, masses: Masses) -> pd.DataFrame
         robot, (position, turn), (drives[nearest].copy(), commands[nearest]), robot.twists(), False
     )
     reached = np.isfinite(nominal).all(axis=1)
+    if any(problem.effects[name].of_drive_value for name, _ in inference.state.effects if name in problem.effects):
+        # a function of a drive's value is not known beyond the values that were read
+        reached &= ((nominal >= drives.min(axis=0) - _ROUNDING) & (nominal <= drives.max(axis=0) + _ROUNDING)).all(
+            axis=1
+        )
     position, turn, nominal = position[reached], turn[reached], nominal[reached]
     payload, end_s = at_end(problem)
     found = {}

@@ -143,6 +143,23 @@ def test_a_zero_is_lost_only_where_it_is_off_by_more_than_marks_are_read(degrees
     assert values["dq3"] == pytest.approx(zeros[2], abs=2e-3)
 
 
+def test_a_tool_off_by_a_millimetre_next_to_the_last_axis_is_no_lost_zero(tmp_path):
+    """A zero off by 7 degrees moves the tool as far; that of a joint with a long link is lost next to it."""
+    generator = np.random.default_rng(3)
+    arm = replace(_arm(generator)[0], tool_mm=(8.0, 0.0, 0.0))
+    driven, off = generator.uniform(-1.5, 1.5, (50, 6)), np.zeros(6)
+    for off[2] in (0.0, np.radians(3.0)):
+        seen = replace(arm, tool_mm=(8.0, 1.0, 0.0)).forward(driven + off)
+        seen = Rotation.from_rotvec([0.4, -1.0, 0.3]).apply(seen) + np.array([900.0, -2000.0, 300.0])
+        columns = dict(zip(arm.parts.columns, driven.T, strict=True)) | rows.vector_columns("measured", seen)
+        file = tmp_path / "mine.csv"
+        pd.DataFrame({"trajectory": "poses"} | columns).to_csv(file, index=False)
+        noted = [note for note in ingest(IngestSpec(str(file), frame="register"), arm).notes if "lost" in note]
+        assert [note.partition(":")[0] for note in noted] == [
+            "the zero of 1 drive is lost, by 3 degrees at joint 3"
+        ] * bool(off[2])
+
+
 def test_zeros_that_are_known_are_left_alone(tmp_path):
     generator = np.random.default_rng(5)
     made = _arm(generator)

@@ -79,6 +79,9 @@ def _campaign(name, folder, points, effects=None):
     return _Campaign(robot, errors, effects, frame, write_corrected(result, section, _MASSES, file), file, shrink)
 
 
+_USE_DRIVES = "use the drive values of corrected_drives.parquet, which is in the folder of this file"
+
+
 @pytest.fixture(scope="module")
 def hexapod(tmp_path_factory):
     return _campaign("hexapod", tmp_path_factory.mktemp("hexapod"), 14)
@@ -273,7 +276,7 @@ def test_what_a_corrected_file_leaves_beyond_the_diagnosis_is_said(arm, hexapod,
     verdict = arm.found.verdict
     speeds = arm.frame["speed_mm_s"]
     loads = f"payload 0 kg, speed {speeds.min():.3g}( to {speeds.max():.3g})? mm/s, temperature unknown"
-    held = rf": (\S+) mm rms remain at poses and loads like those measured \({loads}\); use corrected_drives$"
+    held = rf": (\S+) mm rms remain at poses and loads like those measured \({loads}\); {_USE_DRIVES}$"
     left = float(re.search(held, verdict["file_remainder"])[1])
     assert verdict["file_remainder"].startswith(
         "this URDF holds the geometry only and not encoder eccentricity, backlash:"
@@ -371,7 +374,7 @@ def test_a_tilt_that_no_file_holds_is_said_with_what_remains(attached, tmp_path,
         f"this MJCF holds geometry, compliance and backlash of the drives and not that {tilt}: "
         f"{left:.2g} mm rms remain at poses and loads like those measured"
     )
-    assert end.endswith("; use corrected_drives")
+    assert end.endswith(f"; {_USE_DRIVES}")
 
 
 def test_a_file_lists_the_drives_of_an_effect_by_the_intervals_that_the_page_shows():

@@ -83,11 +83,10 @@ class Truth:
 
     @property
     def share(self):
-        """The cause's share of the held-out gap: all except the error of the calibration from noise."""
-        if not self.acts or not self.before_mm:
+        """The cause's share of the gap at the file's rows: all except the error of the calibration from noise."""
+        if not self.acts or not self.seen_mm:
             return 0.0
-        uncertain = self.noise_rms_mm**2 * len(self.geometry) / (3.0 * self.rows)
-        return float(np.clip(1.0 - uncertain / self.before_mm**2, 0.0, 1.0))
+        return float(min((self.strength * self.noise_rms_mm / self.seen_mm) ** 2, 1.0))
 
 
 def truth_of(draw, run, folder):
