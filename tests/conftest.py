@@ -5,6 +5,8 @@ import os
 # one thread for linear algebra, as snakemake gives its scripts: sums are the same and two workers do not compete
 for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
+# some environments forbid to keep compiled modules: each of some hundred jobs would compile those of the package anew
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 import numpy as np  # noqa: E402
 import pytest  # noqa: E402

@@ -22,7 +22,6 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from scipy.linalg import solve_triangular
 from scipy.special import gammaln, log_ndtr, logsumexp
-from scipy.stats import multivariate_normal
 
 from rrru.arrays import FloatArray
 from rrru.errors import FitError
@@ -197,6 +196,9 @@ def _log_probability(mean: FloatArray, covariance: FloatArray, low: FloatArray, 
     below, above = ((bound - mean)[chosen] for bound in (low, high))
     if not (covariance - np.diag(np.diag(covariance))).any():
         return float(_log_between(below / sd[chosen], above / sd[chosen]).sum())
+    # loading it takes a fifth of a job's start, and few jobs come here
+    from scipy.stats import multivariate_normal
+
     probability = multivariate_normal.cdf(
         above,
         cov=covariance,

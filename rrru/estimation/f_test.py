@@ -26,7 +26,7 @@ from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
-from scipy import special, stats
+from scipy import special
 
 from rrru.arrays import FloatArray
 from rrru.estimation.estimate import Estimate
@@ -139,6 +139,9 @@ class AddedColumns:
 
     def power(self, limit: float, effects: FloatArray, noise: float) -> FloatArray:
         """Probabilities (...) that p is below a limit for effects (n, a, ...) in the span of a single block."""
+        # loading it takes a fifth of a job's start, and few jobs come here
+        from scipy import stats
+
         off_center = (self.model.remainder(effects) ** 2).sum(axis=0) / noise**2
         threshold = stats.f.isf(limit, self.rank, self.freedom)
         # scipy's distribution is wrong at 0 itself

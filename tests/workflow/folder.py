@@ -9,6 +9,7 @@ import subprocess
 import sys
 import warnings
 from pathlib import Path
+from unittest import mock
 
 from tests.places import ROOT
 
@@ -57,6 +58,24 @@ def run(folder, *targets, **options):
 
 def dry_run(folder, *targets, overlays=()):
     """Exit code and output of a dry run within this process, which costs a tenth of a process of its own."""
+    return run_here(folder, "-n", *targets, overlays=overlays, cores=1)
+
+
+@contextlib.contextmanager
+def _forgotten(folder):
+    """Afterwards the user's modules of a folder are not loaded: the next folder may have others of the same names."""
+    places = list(sys.path)
+    try:
+        yield
+    finally:
+        sys.path[:] = places
+        for name, module in list(sys.modules.items()):
+            if str(getattr(module, "__file__", "")).startswith(f"{folder}{os.sep}"):
+                del sys.modules[name]
+
+
+def run_here(folder, *targets, overlays=(), cores=2):
+    """Exit code and output of snakemake within this process: without what its jobs print, with logs of failed ones."""
     from snakemake.cli import main
 
     link(folder)
@@ -68,10 +87,13 @@ def dry_run(folder, *targets, overlays=()):
         stack.enter_context(warnings.catch_warnings())
         warnings.simplefilter("ignore", ResourceWarning)
         stack.enter_context(contextlib.chdir(folder))
+        stack.enter_context(_forgotten(folder))
         stack.enter_context(contextlib.redirect_stdout(output))
         stack.enter_context(contextlib.redirect_stderr(output))
+        # of the jobs, whose folder is another one
+        stack.enter_context(mock.patch.dict(os.environ, {"PYTHONPATH": str(ROOT)}))
         try:
-            main(["-n", "--cores", "1", *targets, *chosen])
+            main(["--cores", str(cores), *targets, *chosen])
         except SystemExit as stopped:
             code = stopped.code
         gc.collect()

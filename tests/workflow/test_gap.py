@@ -10,7 +10,7 @@ from rrru.effects.library import active_effects
 from rrru.robots.ptt3 import Ptt3
 from rrru.simulation.virtual_robot import VirtualRobot
 from tests.places import DATA
-from tests.workflow.folder import dry_run, run
+from tests.workflow.folder import dry_run, run_here
 
 _DRIFT = """
 import numpy as np
@@ -28,7 +28,7 @@ class Drift:
 def _run(folder, overlay, *targets):
     """Exit code and output of snakemake with an overlay in a folder of its own."""
     (folder / "mine.yaml").write_text(overlay)
-    return run(folder, *targets, overlays=("mine.yaml",))
+    return run_here(folder, *targets, overlays=("mine.yaml",))
 
 
 def test_an_effect_of_ones_own_takes_part_and_editing_it_reruns_the_diagnosis(tmp_path):

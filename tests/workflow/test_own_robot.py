@@ -15,7 +15,7 @@ from rrru.robots.catalogue import make_mechanism
 from tests.formats import humanoid
 from tests.places import ROOT
 from tests.refusals import refusals
-from tests.workflow.folder import run
+from tests.workflow.folder import run_here
 
 # a planar 3-RRR: three legs of two links, driven at the base, hold a plate in a plane
 _MODULE = '''
@@ -77,7 +77,7 @@ def _run(folder, reads="", **parts):
     parts["reads"] = reads
     (folder / "mine.yaml").write_text(_OVERLAY.format(**parts))
     targets = [f"results/campaigns/own/{name}.parquet" for name in _TABLES]
-    code, output = run(folder, *targets, "results/figures/own/cross.png", overlays=("mine.yaml",))
+    code, output = run_here(folder, *targets, "results/figures/own/cross.png", overlays=("mine.yaml",))
     assert code == 0, output
     names = (*_TABLES, "measurements", "gauge")
     return {name: pd.read_parquet(folder / f"results/campaigns/own/{name}.parquet") for name in names}

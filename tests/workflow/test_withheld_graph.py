@@ -33,13 +33,13 @@ def _of(jobs, table):
 def test_the_plan_holds_the_check(jobs):
     rules = [rule for rule, _, _ in jobs]
     chunks = rules.count("withheld_diagnose")
-    assert chunks == 3 and rules.count("withheld_robots") == rules.count("withheld_score") == chunks
+    assert chunks == 2 and rules.count("withheld_robots") == rules.count("withheld_score") == chunks
     assert rules.count("withheld_summary") == 1
 
 
 def test_no_diagnosis_is_given_an_answer(jobs):
     answers = _of(jobs, "answers")
-    assert len(answers) == 3
+    assert len(answers) == 2
     assert {rule for rule, _, outputs in jobs if outputs & answers} == {"withheld_robots"}
     # the advised run is driven by the robot itself
     with_truth = {"withheld_score", "withheld_methods", "withheld_advice"}
