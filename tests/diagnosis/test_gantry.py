@@ -8,6 +8,9 @@ from rrru.diagnosis.settings import GapSettings
 from rrru.kinematics.dynamics import Masses
 from tests.diagnosis.gantry import GANTRY, NOISE_MM, campaign, stops
 
+# of the waves of an error function with steps, see `rrru.effects.drive_error_function`
+_FINEST_ORDER = 128
+
 
 def _diagnosed(frame, without=(), draws=10):
     """Verdict, and value and standard error by parameter."""
@@ -90,9 +93,13 @@ def test_a_step_of_a_scale_is_no_noise_on_few_stops(size_mm):
     assert 0.5 * off < found.verdict["gap_after_rms_mm"] < 2.0 * off
 
 
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", [1, 2, 3])
 def test_the_explained_fraction_counts_where_a_step_may_be_between_two_stops(seed):
-    """The function that is fitted goes smoothly from one stop to the other; the scale does not."""
+    """The function that is fitted goes smoothly from one stop to the other; the scale does not.
+
+    The step of seed 3 is between stops that are 1.6 mm apart. That is less than the finest wave of the functions
+    resolves: what they miss at these two stops counts as noise, and the explained fraction as too small.
+    """
 
     def joined(way):
         return way + 0.2 * (way > [600.0, np.inf, np.inf])
@@ -102,7 +109,10 @@ def test_the_explained_fraction_counts_where_a_step_may_be_between_two_stops(see
     function = found.tables["gap_drive_functions"].query("drive == 1")
     true = 0.2 * (function["drive_value"] > 600.0)
     share = 1.0 - ((function["error"] - true + true.mean()) ** 2).mean() / true.var()
-    assert found.verdict["share_closed_low"] <= share <= found.verdict["share_closed_high"]
+    stops_mm = np.unique(found.inference.problem.motion.drive[:, 0])
+    resolved = np.diff(stops_mm)[np.searchsorted(stops_mm, 600.0) - 1] > np.ptp(stops_mm) / (2.0 * _FINEST_ORDER)
+    assert resolved == (seed != 3) and found.verdict["share_closed"] > 0.9
+    assert found.verdict["share_closed_low"] <= share and (share <= found.verdict["share_closed_high"] or not resolved)
 
 
 def test_a_large_step_of_a_scale_is_no_lead_error_in_addition():
