@@ -284,6 +284,8 @@ def _causes(facts: Facts) -> list[str]:
     elif _overlap(facts):
         with_rest = " and of what is unexplained" if facts["unexplained"] else ""
         said.append(f"These shares add up to more than the gap: parts of the effects{with_rest} cancel each other.")
+    elif with_shares:
+        said += _common(facts)
     if facts["unexplained"]:
         share = share_with_interval(next(part for part in facts["budget"] if part["kind"] == "unexplained"))
         if said:
@@ -489,6 +491,18 @@ def _open(facts: Facts) -> list[str]:
         return []
     first = "Parts of the unexplained share could be" if facts["unexplained"] else "These data cannot rule out"
     return [f"{first}: {', '.join(listed)}."]
+
+
+def _common(facts: Facts) -> list[str]:
+    """What two causes make together in addition to what each makes alone, where that is worth a sentence."""
+    names = {effect["name"] for effect in facts["effects"]}
+    parts = [part for part in facts["budget"] if part["kind"] == "covariance"]
+    return [
+        f"Another {percent(part['share'])} of the gap is made by {' and '.join(map(readable, pair))} together, "
+        "since their parts resemble each other."
+        for part in parts
+        if part["share"] >= OPTIONS.min_mentioned_share and names.issuperset(pair := part["part"].split(" and "))
+    ]
 
 
 def _overlap(facts: Facts) -> bool:

@@ -128,6 +128,7 @@ def _short(facts: Facts) -> str:
     if facts["unexplained"]:
         share = next(_known_share(part) for part in facts["budget"] if part["kind"] == "unexplained")
         named.append(("something unexplained", share))
+    named.sort(key=lambda one: -(one[1] or 0.0))
     causes = ", ".join(words if share is None else f"{words} {percent(share)}" for words, share in named)
     following = f" Next: {facts['next'][0]['run']}." if facts["next"] else ""
     return f"{causes.capitalize() or 'Nothing to add'} (probability {probability(facts['probability'])}).{following}"

@@ -167,6 +167,21 @@ def test_shares_overlap_only_where_there_are_several(shares, unexplained, overla
 
 
 @pytest.mark.parametrize(
+    ("share", "effects", "said"),
+    [(0.3, "link_flexure+backlash", True), (0.04, "link_flexure+backlash", False), (0.3, "link_flexure", False)],
+)
+def test_what_two_causes_make_together_is_said_where_it_is_a_part_of_the_gap(share, effects, said):
+    budget = synthetic_gap.gap_budget(CAMPAIGN)
+    budget.loc[budget["kind"] == "covariance", "share"] = share
+    sentences = answered(budget=budget, effects=effects)["sentences"]
+    common = [one for one in sentences if "together, since" in one]
+    wanted = (
+        "Another 30 % of the gap is made by link flexure and backlash together, since their parts resemble each other."
+    )
+    assert common == [wanted] * said
+
+
+@pytest.mark.parametrize(
     ("effects", "who"),
     [
         ("link_flexure+unexplained", "With it and possible further causes (drive compliance) in the simulator"),

@@ -56,7 +56,7 @@ def _truth(**more):
 _NOTHING = {"effects": frozenset(), "leg": 0, "strength": 0.0, "chi2": 0.0, "numbers": {}}
 _UNKNOWN = {"effects": frozenset(), "outside": True, "numbers": {}}
 _ENDINGS = {"urdf": ".urdf", "mjcf": ".xml"}
-_SHARE = 1.0 - 0.035**2 / 375.0 / 0.3**2
+_SHARE = (8.0 * 0.035 / 0.3) ** 2
 _BUDGET = {"part": "backlash", "kind": "effect"}
 _OF_DQ1 = {"effect": "calibration", "parameter": "dq1"}
 _SIZE = {"effect": "backlash", "parameter": "width2"}
@@ -86,6 +86,11 @@ _CASES = [
         ({"name": "servo lag", "acts": "more than 0.99"}, {}, _FACTS),
     ),
     ("shares are not determined", ({}, {"before_mm": 0.02}, _FACTS), ({}, {}, _FACTS)),
+    (
+        "a common share",
+        ({"first": "backlash", "second": "backlash"}, {}, _FACTS),
+        ({"first": "backlash", "second": "link flexure"}, {}, _FACTS),
+    ),
     (
         "shares overlap",
         ({}, {}, _FACTS | {"effects": [_EFFECT, _EFFECT | {"share": 0.4}]}),

@@ -49,6 +49,8 @@ _SENTENCES = {
     "a cause without a share": rf"(?:Also there is|An undetermined share(?: of the gap)? is) {_CAUSE}",
     "shares are not determined": r"The gap is too small relative to the noise: their shares .*",
     "the effects are confounded": r"The effects are confounded with each other: their shares .*",
+    "a common share": rf"Another {_NUMBER} % of the gap is made by (?P<first>[a-z ]+?) and (?P<second>[a-z ]+) "
+    r"together, .*",
     "shares overlap": r"These shares add up to more than the gap.*",
     "something is unexplained": rf"(?:Another|It is systematic, and no effect .*:) "
     rf"(?:(?P<share>{_NUMBER}) %|(?:an )?undetermined share) .*",

@@ -366,6 +366,7 @@ _JUDGES = {
     "a cause without a share": _cause,
     "the corrected file is worse": lambda stated, t, _: t.file_mm > _AS_GOOD * t.after_mm,
     "shares are not determined": lambda _, t, __: t.before_mm < t.noise_rms_mm,
+    "a common share": lambda stated, t, _: all(_one_of([stated[name]], t) for name in ("first", "second")),
     "shares overlap": _overlap,
     "something is unexplained": _unexplained,
     "the unexplained follows": _unexplained,
