@@ -210,6 +210,9 @@ class HeldOut:
             functions = enumerate(effect.along_drives(replace(motion, drive=used)))
             between = effect.along_drives(replace(motion, drive=over_range(used)))
             for (k, function), fitted, value in zip(functions, between, over_range(used).T, strict=True):
+                if not np.ptp(value):
+                    # a drive that stands still has no values between its stops
+                    continue
                 own = coordinates[effect.coordinates.legs == k + 1]
                 before, after, share = jumps(value, used[:, k], function @ own)
                 squares = (fitted @ own - before) ** 2, (fitted @ own - after) ** 2
