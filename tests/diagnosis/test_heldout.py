@@ -186,6 +186,24 @@ def test_shares_are_of_parts_that_a_refit_without_the_fold_predicts():
     np.testing.assert_allclose(list(shares.values()), [left(part) @ gap / total for part in parts], atol=1e-6)
 
 
+def test_without_a_gap_beyond_the_noise_there_are_no_shares():
+    problem = problem_of(measure(noise_mm=0.5 * NOISE_MM), {"servo_lag": EFFECTS["servo_lag"]})
+    held_out = HeldOut(problem, problem.evidence(problem.linearise(calibrate(problem))))
+    assert held_out.shares(TERMS[:1], PRIOR_SCALES[:1], 0) == {"servo_lag": 0.0}
+
+
+def test_shares_do_not_count_readings_at_which_an_effect_lacks_what_it_needs(full):
+    """A third of the readings have no column of the effect: shares are those of the other two thirds alone."""
+    problem, term = full.problem, TERMS[1:]
+    known = {"leg_asymmetry": np.arange(len(problem)) % 48 < 32}
+    linear = full.evidence.linear
+    columns = linear.columns["leg_asymmetry", 0] * known["leg_asymmetry"][:, None, None]
+    linear = replace(linear, columns=linear.columns | {("leg_asymmetry", 0): columns})
+    problem = replace(problem, known=known)
+    found = HeldOut(problem, problem.evidence(linear)).shares(term, [3.0], 0)
+    assert found["leg_asymmetry"] == pytest.approx(full.shares(term, [3.0], 0)["leg_asymmetry"], abs=0.03)
+
+
 def _of_jumps(drive):
     """Held-out predictions of an arm at drive values (n, 6) whose drives have functions that jump, and their term."""
     frame = arms.commands(drive)
