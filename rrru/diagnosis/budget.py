@@ -174,7 +174,8 @@ def _noise_parts(
     """Draws (b,) of the instrument's mean square, and by name draws and probability of scatter and runs."""
     problem = inference.problem
     model = problem.noise or NoiseModel.white(problem.noise_mm)
-    freedom = max(len(problem) - inference.evidence.linear.base.shape[-1], 1)
+    # of each axis: a parameter takes one of the numbers of all three
+    freedom = max(len(problem) - inference.evidence.linear.calibration_basis.shape[1] / 3.0, 1.0)
     axes = model.axis_mm**2 * (1.0 + np.sqrt(2.0 / freedom) * generator.standard_normal((draws, 3)))
     scatter, probability = np.zeros((draws, 3)), np.nan
     if stated_mm:
