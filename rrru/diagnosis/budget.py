@@ -29,7 +29,7 @@ def budget(
     inference: InferenceResult, stated_mm: float | None, generator: np.random.Generator, draws: int
 ) -> pd.DataFrame:
     """Rows of `gap_budget` without the campaign; stated_mm: the instrument's noise per axis, None where unknown."""
-    left = _LeftByCalibration(inference.evidence.linear.base, inference.problem.on_robot)
+    left = _LeftByCalibration(inference.evidence.linear.calibration_basis, inference.problem.on_robot)
     squares, acting, products = _drawn(inference, left, generator, draws)
     instrument_mm2, noise = _noise_parts(inference, stated_mm, generator, draws)
     residual = inference.problem.residual(inference.calibrated)
@@ -106,13 +106,13 @@ def _drawn(
 
 
 class _LeftByCalibration:
-    """Residuals of a calibration with columns (m, 3, p), at those of the m readings that count.
+    """Residuals of a calibration of an orthonormal basis (3m, r), at those of the m readings that count.
 
     taken: share of the noise that it absorbs there.
     """
 
-    def __init__(self, columns: FloatArray, counted: BoolArray) -> None:
-        self._basis, _ = np.linalg.qr(columns.reshape(-1, columns.shape[-1]))
+    def __init__(self, basis: FloatArray, counted: BoolArray) -> None:
+        self._basis = basis
         self._counted = np.repeat(counted, 3)
         self.taken = float((self._basis[self._counted] ** 2).sum() / self._counted.sum())
 
@@ -174,7 +174,8 @@ def _noise_parts(
     """Draws (b,) of the instrument's mean square, and by name draws and probability of scatter and runs."""
     problem = inference.problem
     model = problem.noise or NoiseModel.white(problem.noise_mm)
-    freedom = max(len(problem) - inference.evidence.linear.base.shape[-1], 1)
+    # of each axis: a parameter takes one of the numbers of all three
+    freedom = max(len(problem) - inference.evidence.linear.calibration_basis.shape[1] / 3.0, 1.0)
     axes = model.axis_mm**2 * (1.0 + np.sqrt(2.0 / freedom) * generator.standard_normal((draws, 3)))
     scatter, probability = np.zeros((draws, 3)), np.nan
     if stated_mm:

@@ -13,10 +13,8 @@ from rrru.diagnosis.approach_direction import has_direction
 from rrru.diagnosis.calibrate import observations_of
 from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.problem import DiagnosisProblem
+from rrru.diagnosis.state import RANK_TOLERANCE
 from rrru.errors import FitError
-
-# singular values of columns of unit length below this share of the largest are rounding
-_RANK_TOLERANCE = 1e-9
 
 
 def require_determined(problem: DiagnosisProblem, whose: str = "") -> DiagnosisProblem:
@@ -68,7 +66,7 @@ def _rank(columns: FloatArray) -> int:
     """Numerical rank of derivatives (m, 3, p), each parameter by how far it moves what is read."""
     flat = columns.reshape(-1, columns.shape[-1])
     size = np.maximum(np.linalg.norm(flat, axis=0), 1e-300)
-    return int(np.linalg.matrix_rank(np.linalg.qr(flat / size, mode="r"), rtol=_RANK_TOLERANCE))
+    return int(np.linalg.matrix_rank(np.linalg.qr(flat / size, mode="r"), rtol=RANK_TOLERANCE))
 
 
 def _why_undetermined(problem: DiagnosisProblem, rank: int) -> str:

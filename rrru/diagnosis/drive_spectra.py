@@ -346,11 +346,14 @@ def one_step(data: FloatArray, basis: FloatArray, drive_effect: FloatArray, driv
     """Log likelihood of data (m,) under one step of one drive's error, up to the constant of `likeliest`.
 
     Every drive and place of its range is equally probable; size and noise are the likeliest for each. A step explains E
-    of the sum of squares S of count numbers. Its likeliest signal is t = (count E - S) / (S - E) times the noise.
+    of the sum of squares S of count numbers. Its likeliest signal is t = (count E - S) / (S - E) times the noise, up
+    to the largest signal that is tried for a spectrum.
     basis (m, b): columns that are fitted together with it; drive_effect (n, 3, K): derivative by the actuator values;
     drive (n, K): these. No spectrum has a step as its typical function, since it is flat on both sides of it.
     """
     count, square, found = len(data) - basis.shape[1], float(data @ data), []
+    # of exact data: without noise no likelihood would be finite
+    highest = count * np.exp(2.0 * OPTIONS.max_log_signal_to_noise)
     for response, value in zip(np.moveaxis(drive_effect, 2, 0), drive.T, strict=True):
         order = np.argsort(value, kind="stable")
         (ends,) = np.nonzero(np.diff(value[order]))
@@ -360,7 +363,7 @@ def one_step(data: FloatArray, basis: FloatArray, drive_effect: FloatArray, driv
         size, moment, *taken = (rows[order].sum(axis=0) - np.cumsum(rows[order], axis=0)[ends]).T
         free = size - np.sum(np.square(taken), axis=0)
         explained = np.where(free > OPTIONS.min_free_wave_share * size, moment**2 / np.maximum(free, 1e-300), 0.0)
-        signal = np.maximum((count * explained - square) / np.maximum(square - explained, 1e-300), 0.0)
+        signal = np.clip((count * explained - square) / np.maximum(square - explained, 1e-300), 0.0, highest)
         noise = (square - explained * signal / (1.0 + signal)) / count
         width = np.diff(value[order])[ends] / max(np.ptp(value), 1e-300)
         found.append(np.log(width) - 0.5 * count * np.log(noise) - 0.5 * np.log1p(signal))

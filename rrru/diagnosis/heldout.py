@@ -128,8 +128,12 @@ class HeldOut:
         analysis for systems with independent and/or correlated inputs, Journal of Physical Chemistry A 114, 2010). Two
         large parts that cancel have none, and none takes the part of another one because it comes first. A part is
         predicted at each reading by the fit without its fold: what a rough function follows by chance is no share. The
-        gap and the parts are those at the positions on the robot that a calibration leaves.
+        gap and the parts are those at the positions on the robot that a calibration leaves; without a gap beyond the
+        noise all shares are zero. Readings at which a term lacks what it needs do not count.
         """
+        part = self.on_complete(terms)
+        if part is not self:
+            return part.shares(terms, prior_scales, level)
         linear, rows = self.evidence.linear, self.problem.on_robot
         calibration, *blocks = self._blocks(terms)
         ends = np.cumsum([block.shape[-1] for block in (calibration, *blocks)])
@@ -138,13 +142,14 @@ class HeldOut:
             out = self.fold == number
             for k, (block, first) in enumerate(zip(blocks, ends, strict=False)):
                 parts[out, :, k] = block[out] @ fit.mean[first : first + block.shape[-1]]
-        basis, _ = np.linalg.qr(calibration.reshape(-1, calibration.shape[-1]))
+        basis = linear.calibration_basis
         flat = np.concatenate([parts, linear.data[..., None]], axis=-1).reshape(len(basis), -1)
         left = (flat - basis @ (basis.T @ flat)).reshape(*linear.data.shape, -1)[rows]
         gap = left[..., -1]
         taken = float((basis.reshape(*linear.data.shape, -1)[rows] ** 2).sum() / gap.size)
-        total = max(float((gap**2).sum()) - gap.size * self.problem.noise_mm**2 * (1.0 - taken), 1e-300)
-        return {term.effect: float((left[..., k] * gap).sum()) / total for k, term in enumerate(terms)}
+        total = float((gap**2).sum()) - gap.size * self.problem.noise_mm**2 * (1.0 - taken)
+        inverse = 1.0 / total if total > 0.0 else 0.0
+        return {term.effect: float((left[..., k] * gap).sum()) * inverse for k, term in enumerate(terms)}
 
     def spread_at_new_stops(
         self, terms: Sequence[EffectTerm], prior_scales: Sequence[float] | FloatArray, level: int
@@ -210,6 +215,9 @@ class HeldOut:
             functions = enumerate(effect.along_drives(replace(motion, drive=used)))
             between = effect.along_drives(replace(motion, drive=over_range(used)))
             for (k, function), fitted, value in zip(functions, between, over_range(used).T, strict=True):
+                if not np.ptp(value):
+                    # a drive that stands still has no values between its stops
+                    continue
                 own = coordinates[effect.coordinates.legs == k + 1]
                 before, after, share = jumps(value, used[:, k], function @ own)
                 squares = (fitted @ own - before) ** 2, (fitted @ own - after) ** 2

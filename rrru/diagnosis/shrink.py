@@ -9,7 +9,7 @@ import pandas as pd
 
 from rrru.arrays import BoolArray, FloatArray, IntArray
 from rrru.diagnosis.aliases import Row
-from rrru.diagnosis.heldout import resampled_rows
+from rrru.diagnosis.heldout import HeldOut, resampled_rows
 from rrru.diagnosis.inference import InferenceResult
 from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.problem import DiagnosisProblem
@@ -62,9 +62,9 @@ def order_by_share(inference: InferenceResult) -> tuple[tuple[EffectTerm, float]
     """(term, share of the gap's mean square on left-out points that it removes when it comes next), largest first."""
     left, result = list(inference.hypothesis.terms), []
     chosen: list[EffectTerm] = []
-    start = now = _gap_mm2(inference, [])
+    start = now = _gap_mm2(inference, [], inference.held_out)
     while left:
-        after = [_gap_mm2(inference, [*chosen, term]) for term in left]
+        after = [_gap_mm2(inference, [*chosen, term], inference.held_out) for term in left]
         best = int(np.argmin(after))
         result.append((left[best], (now - after[best]) / max(start, 1e-12)))
         now = after[best]
@@ -75,18 +75,19 @@ def order_by_share(inference: InferenceResult) -> tuple[tuple[EffectTerm, float]
 def losses_without(inference: InferenceResult) -> dict[str, float]:
     """By effect of the fit how much larger the mean square gap on left-out points is without it.
 
-    As a share of what remains with all of them.
+    As a share of what remains with all of them. Readings at which one of them lacks what it needs do not count.
     """
     terms = inference.hypothesis.terms
-    remains = max(_gap_mm2(inference, terms), 1e-300)
-    without = {one.effect: _gap_mm2(inference, [term for term in terms if term != one]) for one in terms}
+    held_out = inference.held_out.on_complete(terms)
+    remains = max(_gap_mm2(inference, terms, held_out), 1e-300)
+    without = {one.effect: _gap_mm2(inference, [term for term in terms if term != one], held_out) for one in terms}
     return {name: gap / remains - 1.0 for name, gap in without.items()}
 
 
-def _gap_mm2(inference: InferenceResult, terms: Sequence[EffectTerm]) -> float:
+def _gap_mm2(inference: InferenceResult, terms: Sequence[EffectTerm], held_out: HeldOut) -> float:
     """Mean square gap on left-out points with some terms of the hypothesis, less noise, and at least zero."""
-    hypothesis, level, problem = inference.hypothesis, inference.level, inference.problem
-    prediction = inference.held_out.predict(terms, hypothesis.strengths_of(terms, level), level, uncertain=False)
+    hypothesis, level, problem = inference.hypothesis, inference.level, held_out.problem
+    prediction = held_out.predict(terms, hypothesis.strengths_of(terms, level), level, uncertain=False)
     squares = (prediction.residual_mm[problem.on_robot] ** 2).sum(axis=1)
     return max(float(squares.mean()) - 3.0 * problem.noise_mm**2, 0.0)
 

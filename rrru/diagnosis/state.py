@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Self
 
 import numpy as np
@@ -11,6 +12,9 @@ from rrru.diagnosis.aliases import EffectKey, WeightStep
 from rrru.diagnosis.discrepancy_basis import Library
 from rrru.diagnosis.payload_nuisance import WEIGHT
 from rrru.effects.protocol import Contribution, Motion, is_compliant, lacks_values
+
+# singular values of columns of unit length below this share of the largest are rounding
+RANK_TOLERANCE = 1e-9
 
 
 @dataclass(frozen=True)
@@ -86,6 +90,14 @@ class LinearizedProblem:
     by_weight: dict[EffectKey, FloatArray] = field(default_factory=dict)
     weight_steps: tuple[WeightStep, ...] = ()
     base_prior: tuple[FloatArray, FloatArray] | None = None
+
+    @cached_property
+    def calibration_basis(self) -> FloatArray:
+        """Orthonormal basis (3m, r) of the derivatives by the deviations, without combinations that change nothing."""
+        columns = self.base.reshape(-1, self.base.shape[-1])
+        basis, triangle = np.linalg.qr(columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300))
+        turned, size, _ = np.linalg.svd(triangle)
+        return np.asarray(basis @ turned[:, size > RANK_TOLERANCE * size.max(initial=0.0)])
 
     def at(self, rows: BoolArray) -> Self:
         """The linearisation at some of its rows (m,)."""

@@ -1,12 +1,15 @@
 """The budget of a gap: parts that add up, against the parts that were simulated."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from rrru.calibration.calibrate import calibrate
 from rrru.campaign import measurements as rows
-from rrru.diagnosis.budget import _row
+from rrru.diagnosis.budget import _noise_parts, _row
 from rrru.diagnosis.settings import GapSettings
+from rrru.estimation.noise_model import NoiseModel
 from rrru.estimation.observations.target_positions import TargetPositions
 from tests.diagnosis.campaigns import (
     FAST,
@@ -20,6 +23,16 @@ from tests.diagnosis.campaigns import (
     plan_of,
     strong,
 )
+
+
+class _Stops:
+    """What `_noise_parts` asks of a problem of 20 stops; noise: its NoiseModel."""
+
+    def __init__(self, noise):
+        self.noise, self.noise_mm = noise, noise.mean_mm
+
+    def __len__(self):
+        return 20
 
 
 def _budget(frame, noise_mm=NOISE_MM):
@@ -108,6 +121,20 @@ def test_what_does_not_repeat_is_scatter():
     assert budget.loc["scatter", "probability"] > 0.99
     true = np.sqrt((_left((effect,)) ** 2).sum(axis=1).mean())
     assert budget.loc["drive_compliance", "rms_mm"] == pytest.approx(true, rel=0.15)
+
+
+def test_of_few_stops_the_noise_above_the_stated_one_is_scatter():
+    """Of 60 numbers 27 parameters leave 11 per axis; scatter and instrument are what they are within a tenth."""
+    generator, model = np.random.default_rng(1), NoiseModel.white(2.0 * NOISE_MM)
+    basis, _ = np.linalg.qr(generator.standard_normal((60, 27)))
+    linear = SimpleNamespace(calibration_basis=basis, base=basis.reshape(20, 3, 27))
+    inference = SimpleNamespace(problem=_Stops(model), evidence=SimpleNamespace(linear=linear))
+    instrument, parts = _noise_parts(inference, NOISE_MM, generator, 20000)
+    scatter, probability = parts["scatter"]
+    assert instrument.mean() == pytest.approx(3.0 * NOISE_MM**2, rel=0.1)
+    assert scatter.mean() == pytest.approx(9.0 * NOISE_MM**2, rel=0.1)
+    assert scatter.std() == pytest.approx(np.sqrt(3.0 * 2.0 / 11.0) * 4.0 * NOISE_MM**2, rel=0.1)
+    assert probability > 0.95
 
 
 def test_the_scatter_is_unknown_where_no_noise_is_stated():

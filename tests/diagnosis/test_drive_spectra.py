@@ -8,6 +8,7 @@ import pytest
 
 from rrru.diagnosis.calibrate import calibrate
 from rrru.diagnosis.drive_spectra import _likeliest_factor, amplitudes, jumps, likeliest, one_step, pursue
+from rrru.diagnosis.options import OPTIONS
 from rrru.effects.drive_error_function import ORDERS
 from rrru.effects.library import find
 from tests.diagnosis import arms
@@ -201,6 +202,19 @@ def test_one_step_has_the_likelihood_of_its_column_at_every_place():
             terms.append(value + np.log((high - low) / np.ptp(at) / 2.0))
     assert one_step(data, basis, effect, drive) == pytest.approx(np.logaddexp.reduce(terms), abs=1e-3)
     assert one_step(data, basis, effect, 0.0 * drive) == -np.inf
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-12, 1e-8])
+def test_one_step_of_exact_data_has_the_largest_signal_that_is_tried(noise):
+    """A step at a place of its own explains all; its signal is 1,000 times the noise, as for a spectrum."""
+    generator, count = np.random.default_rng(1), 14
+    effect, drive = generator.standard_normal((count, 3, 1)), np.arange(count)[:, None] + 0.0
+    basis, _ = np.linalg.qr(generator.standard_normal((3 * count, 4)))
+    data = (effect[..., 0] * (drive > 6.5)).ravel() + noise * generator.standard_normal(3 * count)
+    data, freedom = data - basis @ (basis.T @ data), 3 * count - 4
+    signal = freedom * np.exp(2.0 * OPTIONS.max_log_signal_to_noise)
+    explained = -0.5 * freedom * np.log(data @ data / (1.0 + signal) / freedom) - 0.5 * np.log1p(signal)
+    assert one_step(data, basis, effect, drive) == pytest.approx(explained - np.log(count - 1.0), abs=1e-6)
 
 
 def test_an_injected_wave_has_its_amplitude():

@@ -23,6 +23,7 @@ from rrru.diagnosis.whitened import DISCREPANCY_SCALES
 from rrru.errors import ConfigError
 from rrru.estimation.observations.target_positions import TargetPositions
 from rrru.studies.real import length_tables
+from tests.diagnosis import arms
 from tests.diagnosis.campaigns import (
     EFFECTS,
     FORWARD,
@@ -183,6 +184,55 @@ def test_shares_are_of_parts_that_a_refit_without_the_fold_predicts():
     shares = held_out.shares(TERMS, PRIOR_SCALES, 0)
     assert list(shares) == ["servo_lag", "leg_asymmetry"] and shares["leg_asymmetry"] > 0.9
     np.testing.assert_allclose(list(shares.values()), [left(part) @ gap / total for part in parts], atol=1e-6)
+
+
+def test_without_a_gap_beyond_the_noise_there_are_no_shares():
+    problem = problem_of(measure(noise_mm=0.5 * NOISE_MM), {"servo_lag": EFFECTS["servo_lag"]})
+    held_out = HeldOut(problem, problem.evidence(problem.linearise(calibrate(problem))))
+    assert held_out.shares(TERMS[:1], PRIOR_SCALES[:1], 0) == {"servo_lag": 0.0}
+
+
+def test_shares_do_not_count_readings_at_which_an_effect_lacks_what_it_needs(full):
+    """A third of the readings have no column of the effect: shares are those of the other two thirds alone."""
+    problem, term = full.problem, TERMS[1:]
+    known = {"leg_asymmetry": np.arange(len(problem)) % 48 < 32}
+    linear = full.evidence.linear
+    columns = linear.columns["leg_asymmetry", 0] * known["leg_asymmetry"][:, None, None]
+    linear = replace(linear, columns=linear.columns | {("leg_asymmetry", 0): columns})
+    problem = replace(problem, known=known)
+    found = HeldOut(problem, problem.evidence(linear)).shares(term, [3.0], 0)
+    assert found["leg_asymmetry"] == pytest.approx(full.shares(term, [3.0], 0)["leg_asymmetry"], abs=0.03)
+
+
+def _of_jumps(drive):
+    """Held-out predictions of an arm at drive values (n, 6) whose drives have functions that jump, and their term."""
+    frame = arms.commands(drive)
+    shaken = rows.command(frame) + 0.1 * np.random.default_rng(4).standard_normal((len(drive), 3))
+    problem = arms.problem_of(frame.assign(**rows.vector_columns("measured", shaken)), "drive_error_function")
+    jumping = replace(problem.library["drive_error_function"], steps=0.6)
+    problem = replace(problem, library={jumping.name: jumping})
+    return HeldOut(problem, problem.evidence(problem.linearise(calibrate(problem)))), (EffectTerm(jumping.name),)
+
+
+def test_errors_by_drawn_jumps_have_the_mean_of_all_places_of_the_jump():
+    held_out, terms = _of_jumps(arms.drives(40, np.random.default_rng(2)))
+    mean = held_out.jumps_mm2(terms, [1.0], 0)
+    drawn = held_out.drawn_jumps_mm2(terms, [1.0], 0, (np.random.default_rng(3), 4000))
+    error = drawn.std(axis=0) / np.sqrt(len(drawn))
+    assert mean.min() > 0.0 and (np.abs(drawn.mean(axis=0) - mean) < 4.0 * error).all()
+    # each drive jumps with this probability, or not at all
+    assert (drawn == 0.0).all(axis=1).mean() == pytest.approx(0.4**arms.DRIVES, abs=0.004)
+
+
+def test_a_drive_that_stands_still_has_no_jumps():
+    drive = arms.drives(40, np.random.default_rng(2))
+    drive[:, 1] = 0.2
+    held_out, terms = _of_jumps(drive)
+    found = held_out.jumps_mm2(terms, [1.0], 0)
+    unmoved = held_out.evidence.linear.drive * (np.arange(arms.DRIVES) != 1)
+    evidence = replace(held_out.evidence, linear=replace(held_out.evidence.linear, drive=unmoved))
+    assert found.min() > 0.0
+    np.testing.assert_array_equal(found, HeldOut(held_out.problem, evidence).jumps_mm2(terms, [1.0], 0))
 
 
 def _of_runs(run):

@@ -10,7 +10,7 @@ import pytest
 from rrru.campaign import measurements as rows
 from rrru.campaign.driven_path import starts_of_runs
 from rrru.diagnosis.calibrate import calibrate
-from rrru.diagnosis.state import ModelState
+from rrru.diagnosis.state import LinearizedProblem, ModelState
 from rrru.errors import FitError
 from tests.diagnosis import campaigns
 from tests.diagnosis.campaigns import EFFECTS, MODEL, ROBOT, active, drawn, measure, plan_of, problem_of, robot_of
@@ -201,3 +201,15 @@ def test_a_state_has_a_shape_that_was_searched_without_a_library_that_lists_it()
     state = ModelState(np.zeros(1), {("transmission_error", 7): np.zeros(6)}, {"transmission_error": {"ratio": 4.2}})
     assert state.shape(EFFECTS, ("transmission_error", 7)) == {"ratio": 4.2}
     assert state.shape(EFFECTS, ("transmission_error", 0)) == {"ratio": 50.0}
+
+
+def test_the_basis_of_a_calibration_has_only_what_readings_determine():
+    """Of 9 columns of very unlike sizes 4 are independent: the projection is that of these."""
+    generator = np.random.default_rng(1)
+    few = generator.standard_normal((60, 4))
+    base = few @ generator.standard_normal((4, 9)) * 10.0 ** generator.uniform(-6.0, 3.0, 9)
+    nothing = np.zeros((20, 3))
+    basis = LinearizedProblem(nothing, base.reshape(20, 3, 9), {}, {}, {}, nothing).calibration_basis
+    expected = few @ np.linalg.solve(few.T @ few, few.T)
+    assert basis.shape == (60, 4)
+    np.testing.assert_allclose(basis @ basis.T, expected, atol=1e-9)

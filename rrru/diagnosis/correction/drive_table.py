@@ -1,8 +1,8 @@
 """Compensation table: drive values that bring the robot, as diagnosed, to the commanded positions. mm and rad.
 
 The grid fills the box about the measured points as far as one of these is near, and where an error is a function of
-drives' values as far as these were read. It is the only correction where no
-model file can hold what was found. The robot is at rest, as warm as at the campaign's end.
+drives' values as far as these were read. It is the only correction where no model file can hold what was found. The
+robot is at rest, as warm as at the campaign's end.
 """
 
 import numpy as np
@@ -40,12 +40,15 @@ def corrected_drives(inference: InferenceResult, masses: Masses) -> pd.DataFrame
     )
     reached = np.isfinite(nominal).all(axis=1)
     if any(problem.effects[name].of_drive_value for name, _ in inference.state.effects if name in problem.effects):
-        # a function of a drive's value is not known beyond the values that were read
-        reached &= ((nominal >= drives.min(axis=0) - _ROUNDING) & (nominal <= drives.max(axis=0) + _ROUNDING)).all(
-            axis=1
-        )
+        # a function of a drive's value is not known beyond the values that were read; a drive that stood still has none
+        low, high = drives.min(axis=0), drives.max(axis=0)
+        within = (nominal >= low - _ROUNDING) & (nominal <= high + _ROUNDING)
+        reached &= (within | (high - low <= _ROUNDING)).all(axis=1)
     position, turn, nominal = position[reached], turn[reached], nominal[reached]
     payload, end_s = at_end(problem)
+    loads = {"payload_kg": payload, "time_s": end_s}
+    if not len(position):
+        return _table(robot, (position, turn), (nominal, {0: nominal}), loads)
     found = {}
     for approach in (-1, 1):
         corrected = nominal
@@ -56,7 +59,7 @@ def corrected_drives(inference: InferenceResult, masses: Masses) -> pd.DataFrame
         found[approach] = corrected
     if np.nanmax(np.abs(found[1] - found[-1]), initial=0.0) < OPTIONS.min_sense_difference:
         found = {0: found[1]}
-    return _table(robot, (position, turn), (nominal, found), {"payload_kg": payload, "time_s": end_s})
+    return _table(robot, (position, turn), (nominal, found), loads)
 
 
 def _table(

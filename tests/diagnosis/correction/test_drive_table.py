@@ -1,0 +1,52 @@
+"""The table of corrected drive values where an error is a function of drives' values."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from rrru.diagnosis.calibrate import calibrate
+from rrru.diagnosis.correction.drive_table import corrected_drives
+from rrru.diagnosis.make_problem import make_diagnosis_problem
+from rrru.diagnosis.state import ModelState
+from rrru.effects.library import find
+from rrru.pipeline.setup import as_measured
+from tests.diagnosis import arms
+
+NAMES = list(arms.ARM.parts.columns)
+
+
+def _table(monkeypatch, still=(), jitter=0.0):
+    """The table and the drive values that were read, of 40 stops at which some drives stand still, or nearly so."""
+    every = arms.drives
+
+    def some(number, generator):
+        values = every(number, generator)
+        return np.where(np.isin(np.arange(arms.DRIVES), still), 0.2 + jitter * values, values)
+
+    monkeypatch.setattr(arms, "drives", some)
+    frame = arms.measure(count=40)
+    robot = as_measured(replace(arms.ARM, parameter_set="full"), frame)
+    effect = find("drive_error_function", arms.ARM)
+    problem = make_diagnosis_problem(frame, robot, arms.MASSES, 1.0, {effect.name: effect}, False, 500.0)
+    effect = problem.library[effect.name]
+    state = ModelState(calibrate(problem).deviations, {(effect.name, 0): np.zeros(len(effect.coordinates))})
+    table = corrected_drives(SimpleNamespace(problem=problem, state=state), arms.MASSES)
+    return table, frame[NAMES].to_numpy()
+
+
+@pytest.mark.parametrize("still", [(), (1,)])
+def test_drives_that_move_stay_within_the_values_at_which_their_functions_are_known(monkeypatch, still):
+    table, drives = _table(monkeypatch, still)
+    moved = [k for k in range(arms.DRIVES) if k not in still]
+    nominal = table[NAMES].to_numpy()[:, moved]
+    assert len(table) > 10
+    assert (nominal > drives[:, moved].min(axis=0) - 1e-6).all() and (
+        nominal < drives[:, moved].max(axis=0) + 1e-6
+    ).all()
+
+
+def test_without_a_place_at_which_the_functions_are_known_the_table_is_empty(monkeypatch):
+    table, _ = _table(monkeypatch, (1,), 1e-7)
+    assert not len(table) and {"point", "payload_kg", "approach", *NAMES} <= {*table.columns}
