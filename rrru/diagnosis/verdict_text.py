@@ -17,6 +17,7 @@ from rrru.diagnosis.result_notes import (
     REPEATABILITY_UNKNOWN,
     REPEATABILITY_UNSURE,
     ROBOT_REPEATS,
+    SUCCESSIVE_ALIKE,
 )
 from rrru.diagnosis.result_tables import acting_places, is_off_zero
 from rrru.diagnosis.verdict import NOT_TESTED, POSSIBLE
@@ -50,6 +51,9 @@ _NO_SIZE = "Its size is not determined, because no masses of the links are state
 # what looks like random error above the stated noise, by the note on repeated poses; else it does not repeat
 _ABOVE_NOISE = "is random error above the stated noise. Repeatability is unknown:"
 _RANDOM = {
+    # the first one that applies
+    SUCCESSIVE_ALIKE: "looks like random error, but residuals of successive stops are correlated: it is an error that "
+    "the model lacks, and it follows the time or the path.",
     REPEATABILITY_UNKNOWN: f"{_ABOVE_NOISE} no pose was measured twice.",
     REPEATABILITY_UNSURE: f"{_ABOVE_NOISE} too few poses were measured twice.",
     ROBOT_REPEATS: "looks like random error. Poses that were measured again agree better: it is an error that the "

@@ -12,7 +12,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rrru.diagnosis import verdict_text
-from rrru.diagnosis.result_notes import REPEATABILITY_UNKNOWN, REPEATABILITY_UNSURE, ROBOT_REPEATS
+from rrru.diagnosis.result_notes import (
+    REPEATABILITY_UNKNOWN,
+    REPEATABILITY_UNSURE,
+    ROBOT_REPEATS,
+    SUCCESSIVE_ALIKE,
+)
 from rrru.effects.causes import cause_texts
 from rrru.report.cards import card
 from rrru.report.worth import Worth
@@ -296,6 +301,10 @@ def test_without_a_pose_measured_twice_repeatability_is_unknown():
         (
             ROBOT_REPEATS,
             "looks like random error. Poses that were measured again agree better: it is an error that the model lacks",
+        ),
+        (
+            f"{REPEATABILITY_UNKNOWN}; {SUCCESSIVE_ALIKE}",
+            "looks like random error, but residuals of successive stops are correlated: it is an error that the model",
         ),
     ):
         said = " ".join(answered(notes=note)["sentences"])
