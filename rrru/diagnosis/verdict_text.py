@@ -23,6 +23,7 @@ from rrru.diagnosis.result_tables import acting_places, is_off_zero
 from rrru.diagnosis.verdict import NOT_TESTED, POSSIBLE
 from rrru.effects.causes import cause_texts
 from rrru.effects.protocol import is_per_load
+from rrru.estimation.noise_model import CONTRADICTED
 from rrru.robots.drive_words import DriveWords
 
 SCHEMA = 1
@@ -476,7 +477,12 @@ def _left(facts: Facts) -> list[str]:
     named = {0: "", 1: "it"}.get(len(facts["effects"]), "them")
     further = f"possible further causes ({', '.join(map(readable, facts['unnamed']))})" if facts["unnamed"] else ""
     what = " and ".join(filter(None, (named, further)))
-    size = f"{after} mm; the noise is {noise} mm"
+    found, stated = "", np.sqrt(3.0) * (facts["noise_stated_mm"] or np.nan)
+    if facts["noise_rms_mm"] > CONTRADICTED * stated:
+        found, noise = " that was found", f"{noise} mm (stated: {rounded(stated)} mm in space)"
+    else:
+        noise = f"{noise} mm"
+    size = f"{after} mm; the noise{found} is {noise}"
     return [f"With {what} in the simulator the residual error at left-out points is {size}."]
 
 

@@ -311,6 +311,18 @@ def test_without_a_pose_measured_twice_repeatability_is_unknown():
         assert f"10 % (95 %: 8 % to 13 %) {words}" in said and "does not repeat" not in said
 
 
+@pytest.mark.parametrize(
+    ("stated", "said"),
+    [
+        (0.02, "the noise is 0.035 mm."),
+        (np.nan, "the noise is 0.035 mm."),
+        (0.005, "the noise that was found is 0.035 mm (stated: 0.0087 mm in space)."),
+    ],
+)
+def test_a_noise_that_contradicts_the_stated_one_is_said_to_be_found(stated, said):
+    assert said in " ".join(answered(noise_stated_mm=stated)["sentences"])
+
+
 @pytest.mark.parametrize(("factor", "gap", "why"), [(12.0, 0.02, "small"), (1.0, 0.0, "small"), (12.0, 0.2, "alike")])
 def test_where_shares_are_not_determined_sizes_are_said_and_why(factor, gap, why):
     budget = synthetic_gap.gap_budget(CAMPAIGN)

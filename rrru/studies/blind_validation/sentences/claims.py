@@ -69,7 +69,7 @@ _SENTENCES = {
     "but .*",
     "it looks random and repeats": rf"(?:{_SHARE}|An undetermined share|Some of it) looks like random error\..*",
     "what is left with it": rf"With {_MODEL} in the simulator the residual error at left-out points is {_X} mm; "
-    rf"the noise is {_Y} mm\.",
+    rf"the noise(?: that was found)? is {_Y} mm(?: \(stated: {_NUMBER} mm in space\))?\.",
     "these data cannot rule out": r"(?:These data cannot rule out|Parts of the unexplained share could be): "
     r"(?P<names>.*)\.",
     "next, a run": r"Next: (?:drive|measure) (?P<run>.*)\. That (?:decides|would help to decide) "
