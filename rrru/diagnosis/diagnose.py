@@ -38,6 +38,7 @@ from rrru.diagnosis.result_notes import (
     noise_notes,
     payload_notes,
     posterior_notes,
+    successive_notes,
     undetermined_payload_notes,
     zero_notes,
 )
@@ -206,6 +207,7 @@ def _notes(inference: InferenceResult, stated_mm: float | None, excluded: pd.Dat
         where_not = f"{lacking} of {problem.count} points, where the rows do not determine all that is needed"
         yield f"{', '.join(sorted(acting))} fitted without {where_not}"
     yield from noise_notes(problem, stated_mm, CONTRADICTED)
+    yield from successive_notes(inference, stated_mm, CONTRADICTED)
     yield from mass_notes(problem)
     yield from mounting_notes(inference)
     for effect, note in problem.untestable.items():

@@ -234,6 +234,11 @@ class DiagnosisOptions:
     min_cause_per_noise: float = 0.3
     # random error gets a sentence where it is more probable than not
     min_scatter_probability: float = 0.5
+    # it is no random error where more than half of it continues from stop to stop: a part that does not continue lowers
+    # the correlation of successive residuals by its share. A correlation of white noise has no more standard deviations
+    # than these: assumed, as of zeros
+    min_serial_correlation: float = 0.5
+    min_serial_z: float = 4.0
     # a share beyond this is none: confounded effects add up to a little more than the whole; assumed
     max_mentioned_share: float = 1.5
 

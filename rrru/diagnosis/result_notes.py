@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from scipy.special import chdtri
 
-from rrru.arrays import FloatArray
+from rrru.arrays import FloatArray, IntArray
 from rrru.campaign.ingest.zero_offsets import LARGE
 from rrru.campaign.noise import repeat_noise
 from rrru.diagnosis.inference import InferenceResult
@@ -36,6 +36,8 @@ MOUNTING_ASSUMED = (
 REPEATABILITY_UNKNOWN = "repeatability is unknown: no pose was measured twice"
 REPEATABILITY_UNSURE = "repeatability is unknown: too few poses were measured twice"
 ROBOT_REPEATS = "poses that were measured again agree better than the noise that was found"
+# said where that part is no random error: it has a serial correlation
+SUCCESSIVE_ALIKE = "residuals of successive stops are correlated, so that the error follows the time or the path"
 _SCATTERS = "the robot does not repeat, or the instrument is worse"
 
 
@@ -206,6 +208,31 @@ def noise_notes(problem: DiagnosisProblem, stated_mm: float | None, contradicted
             yield known
     elif problem.noise_mm < stated_mm / contradicted:
         yield f"{found}: the instrument is better"
+
+
+def successive_notes(inference: InferenceResult, stated_mm: float | None, contradicted: float) -> Iterator[str]:
+    """The sentence that an error above the stated noise (mm per axis, None: none) is no random error."""
+    problem = inference.problem
+    if not stated_mm or problem.noise_mm <= contradicted * stated_mm:
+        return
+    rows = problem.on_robot
+    correlation, pairs = serial_correlation(
+        problem.residual(inference.state)[rows], problem.run[rows], problem.stop[rows]
+    )
+    if correlation > OPTIONS.min_serial_correlation and correlation * np.sqrt(pairs) > OPTIONS.min_serial_z:
+        yield SUCCESSIVE_ALIKE
+
+
+def serial_correlation(residual: FloatArray, run: IntArray, stop: IntArray) -> tuple[float, int]:
+    """Correlation of residuals (m, 3) between successive rows of different stops of a run, and the number of pairs.
+
+    Of white noise it is zero with a standard deviation of at most 1 / sqrt(pairs), however the axes are correlated.
+    Rows of one stop share what does not repeat there: they are no pairs.
+    """
+    pair = (np.diff(run) == 0) & (np.diff(stop) != 0)
+    before, after = residual[:-1][pair], residual[1:][pair]
+    size = np.sqrt((before**2).sum() * (after**2).sum())
+    return (float((before * after).sum() / size) if size else 0.0), int(pair.sum())
 
 
 def posterior_notes(posterior: Posterior) -> Iterator[str]:

@@ -17,11 +17,13 @@ from rrru.diagnosis.result_notes import (
     REPEATABILITY_UNKNOWN,
     REPEATABILITY_UNSURE,
     ROBOT_REPEATS,
+    SUCCESSIVE_ALIKE,
 )
 from rrru.diagnosis.result_tables import acting_places, is_off_zero
 from rrru.diagnosis.verdict import NOT_TESTED, POSSIBLE
 from rrru.effects.causes import cause_texts
 from rrru.effects.protocol import is_per_load
+from rrru.estimation.noise_model import CONTRADICTED
 from rrru.robots.drive_words import DriveWords
 
 SCHEMA = 1
@@ -50,6 +52,9 @@ _NO_SIZE = "Its size is not determined, because no masses of the links are state
 # what looks like random error above the stated noise, by the note on repeated poses; else it does not repeat
 _ABOVE_NOISE = "is random error above the stated noise. Repeatability is unknown:"
 _RANDOM = {
+    # the first one that applies
+    SUCCESSIVE_ALIKE: "looks like random error, but residuals of successive stops are correlated: it is an error that "
+    "the model lacks, and it follows the time or the path.",
     REPEATABILITY_UNKNOWN: f"{_ABOVE_NOISE} no pose was measured twice.",
     REPEATABILITY_UNSURE: f"{_ABOVE_NOISE} too few poses were measured twice.",
     ROBOT_REPEATS: "looks like random error. Poses that were measured again agree better: it is an error that the "
@@ -472,7 +477,12 @@ def _left(facts: Facts) -> list[str]:
     named = {0: "", 1: "it"}.get(len(facts["effects"]), "them")
     further = f"possible further causes ({', '.join(map(readable, facts['unnamed']))})" if facts["unnamed"] else ""
     what = " and ".join(filter(None, (named, further)))
-    size = f"{after} mm; the noise is {noise} mm"
+    found, stated = "", np.sqrt(3.0) * (facts["noise_stated_mm"] or np.nan)
+    if facts["noise_rms_mm"] > CONTRADICTED * stated:
+        found, noise = " that was found", f"{noise} mm (stated: {rounded(stated)} mm in space)"
+    else:
+        noise = f"{noise} mm"
+    size = f"{after} mm; the noise{found} is {noise}"
     return [f"With {what} in the simulator the residual error at left-out points is {size}."]
 
 

@@ -18,8 +18,11 @@ from rrru.diagnosis.result_notes import (
     REPEATABILITY_UNKNOWN,
     REPEATABILITY_UNSURE,
     ROBOT_REPEATS,
+    SUCCESSIVE_ALIKE,
     noise_notes,
     payload_notes,
+    serial_correlation,
+    successive_notes,
     undetermined_payload_notes,
     zero_notes,
 )
@@ -205,6 +208,38 @@ def test_what_does_not_repeat_is_said_by_what_poses_say_that_were_measured_again
     # next to a found noise of 0.035 mm ten repeats are too few
     expected = REPEATABILITY_UNSURE if said == ROBOT_REPEATS else said
     assert [*noise_notes(one, 0.03, 1.3)] == ([expected] if expected else [])
+
+
+def _swaying(error_mm, found_mm=0.09):
+    """An inference whose residuals (n, 3) at n stops are an error that is not in the model, and noise of 0.03 mm."""
+    n = len(error_mm)
+    residual = error_mm + 0.03 * np.random.default_rng(3).standard_normal((n, 3))
+    number = np.arange(n)
+    problem = SimpleNamespace(noise_mm=found_mm, on_robot=np.ones(n, dtype=bool), run=0 * number, stop=number)
+    problem.residual = lambda _: residual
+    return SimpleNamespace(problem=problem, state=None)
+
+
+def test_an_error_that_follows_the_time_is_no_random_error():
+    """A pedestal that sways with a period of 20 stops, and the same errors in random order."""
+    sway = 0.12 * np.sin(np.arange(150)[:, None] / 20 * 2 * np.pi) * [0.8, 0.6, 0.5]
+    shuffled = np.random.default_rng(4).permutation(sway)
+    assert [*successive_notes(_swaying(sway), 0.03, 1.3)] == [SUCCESSIVE_ALIKE]
+    assert not [*successive_notes(_swaying(shuffled), 0.03, 1.3)]
+    # as large as stated, or not stated
+    assert not [*successive_notes(_swaying(sway, 0.035), 0.03, 1.3)]
+    assert not [*successive_notes(_swaying(sway), None, 1.3)]
+    # too few stops to say so
+    assert not [*successive_notes(_swaying(sway[:12]), 0.03, 1.3)]
+
+
+def test_rows_of_one_stop_and_of_two_runs_are_no_pairs():
+    residual = np.repeat(np.random.default_rng(5).standard_normal((200, 3)), 2, axis=0)
+    stop = np.repeat(np.arange(200), 2)
+    correlation, pairs = serial_correlation(residual, 0 * stop, stop)
+    assert pairs == 199 and abs(correlation) < 4.0 / np.sqrt(pairs)
+    assert serial_correlation(residual, 0 * stop, np.arange(400))[0] > 0.4
+    assert serial_correlation(residual, np.arange(400), np.arange(400)) == (0.0, 0)
 
 
 def test_a_stated_noise_of_zero_is_no_noise_and_noted():

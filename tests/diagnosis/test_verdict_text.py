@@ -12,7 +12,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rrru.diagnosis import verdict_text
-from rrru.diagnosis.result_notes import REPEATABILITY_UNKNOWN, REPEATABILITY_UNSURE, ROBOT_REPEATS
+from rrru.diagnosis.result_notes import (
+    REPEATABILITY_UNKNOWN,
+    REPEATABILITY_UNSURE,
+    ROBOT_REPEATS,
+    SUCCESSIVE_ALIKE,
+)
 from rrru.effects.causes import cause_texts
 from rrru.report.cards import card
 from rrru.report.worth import Worth
@@ -297,9 +302,25 @@ def test_without_a_pose_measured_twice_repeatability_is_unknown():
             ROBOT_REPEATS,
             "looks like random error. Poses that were measured again agree better: it is an error that the model lacks",
         ),
+        (
+            f"{REPEATABILITY_UNKNOWN}; {SUCCESSIVE_ALIKE}",
+            "looks like random error, but residuals of successive stops are correlated: it is an error that the model",
+        ),
     ):
         said = " ".join(answered(notes=note)["sentences"])
         assert f"10 % (95 %: 8 % to 13 %) {words}" in said and "does not repeat" not in said
+
+
+@pytest.mark.parametrize(
+    ("stated", "said"),
+    [
+        (0.02, "the noise is 0.035 mm."),
+        (np.nan, "the noise is 0.035 mm."),
+        (0.005, "the noise that was found is 0.035 mm (stated: 0.0087 mm in space)."),
+    ],
+)
+def test_a_noise_that_contradicts_the_stated_one_is_said_to_be_found(stated, said):
+    assert said in " ".join(answered(noise_stated_mm=stated)["sentences"])
 
 
 @pytest.mark.parametrize(("factor", "gap", "why"), [(12.0, 0.02, "small"), (1.0, 0.0, "small"), (12.0, 0.2, "alike")])

@@ -131,6 +131,8 @@ _CASES = [
     ),
     ("the noise is larger", ({}, _UNKNOWN, _OUTSIDE), ({}, {}, _FACTS)),
     ("it looks random and repeats", ({}, _UNKNOWN, _OUTSIDE), ({}, {}, _FACTS)),
+    ("it looks random and is correlated", ({}, _UNKNOWN, _OUTSIDE), ({}, {}, _FACTS)),
+    ("successive residuals are correlated", ({}, _UNKNOWN, _OUTSIDE), ({}, {}, _FACTS)),
     ("repeatability is unknown", ({}, {"again": False}, _FACTS), ({}, {}, _FACTS)),
     ("repeatability is unsure", ({}, {}, _FACTS), ({}, {"again": False}, _FACTS)),
     ("an effect needs what is not there", ({"needs": "drive_rate"}, {}, _FACTS), ({"needs": "time_s"}, {}, _FACTS)),

@@ -65,9 +65,11 @@ _SENTENCES = {
     rf"answer(?:, alone or with further causes)?: {_P}\.",
     "it does not repeat": rf"(?:{_SHARE}|An undetermined share|Some of it) does not repeat from pass to pass.*",
     "it is random error": rf"(?:{_SHARE}|An undetermined share|Some of it) is random error above the stated noise.*",
+    "it looks random and is correlated": rf"(?:{_SHARE}|An undetermined share|Some of it) looks like random error, "
+    "but .*",
     "it looks random and repeats": rf"(?:{_SHARE}|An undetermined share|Some of it) looks like random error\..*",
     "what is left with it": rf"With {_MODEL} in the simulator the residual error at left-out points is {_X} mm; "
-    rf"the noise is {_Y} mm\.",
+    rf"the noise(?: that was found)? is {_Y} mm(?: \(stated: {_NUMBER} mm in space\))?\.",
     "these data cannot rule out": r"(?:These data cannot rule out|Parts of the unexplained share could be): "
     r"(?P<names>.*)\.",
     "next, a run": r"Next: (?:drive|measure) (?P<run>.*)\. That (?:decides|would help to decide) "
@@ -98,6 +100,7 @@ _NOTES = {
     "a noise of zero was stated": rf"noise_mm is 0, which no instrument reaches: the noise is estimated, {_X} mm .*",
     "repeatability is unknown": r"repeatability is unknown: no pose was measured twice",
     "repeatability is unsure": r"repeatability is unknown: too few poses were measured twice",
+    "successive residuals are correlated": r"residuals of successive stops are correlated, so that .*",
     "the robot repeats": r"poses that were measured again agree better than the noise that was found",
     "masses are unknown": r"no masses of the links are stated: .*",
     "the mounting is assumed": r"gravity is assumed along -z of the robot's base: .*",

@@ -390,6 +390,8 @@ _JUDGES = {
     # only errors outside every model, as those of MuJoCo's servos, make it look larger
     "the noise is larger": lambda _, t, __: t.outside or t.still_mm > _OWN * t.noise_rms_mm,
     "it looks random and repeats": lambda _, t, __: t.outside or t.still_mm > _OWN * t.noise_rms_mm,
+    "it looks random and is correlated": lambda _, t, __: t.outside or t.still_mm > _OWN * t.noise_rms_mm,
+    "successive residuals are correlated": lambda _, t, __: t.outside or t.still_mm > _OWN * t.noise_rms_mm,
     "repeatability is unknown": lambda _, t, __: not t.again,
     "repeatability is unsure": lambda _, t, __: t.again,
     "an effect needs what is not there": _needs,
