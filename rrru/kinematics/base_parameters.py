@@ -9,9 +9,6 @@ from rrru.arrays import BoolArray, FloatArray
 from rrru.kinematics.legs import TOOL, WORLD, Legs, Parts, unit_twist
 from rrru.parameters import Parameter, ParameterSet
 
-# share of a column that is independent of the others from which on a parameter is well determined: the usual bound of
-# threshold pivoting (I. Duff, A. Erisman and J. Reid, Direct Methods for Sparse Matrices, 1986, section 5.4)
-_WELL_DETERMINED = 0.1
 # largest error of a drive's lost zero offset, in rad and in mm
 _LOST = {"rad": 0.6, "mm": 100.0}
 _AXES = ("x", "y", "z", "rx", "ry", "rz")
@@ -128,29 +125,22 @@ def column_scale(candidates: Sequence[Candidate], characteristic_length_mm: floa
 def choose(
     columns: FloatArray, allowed: Sequence[bool], least: float, basis: FloatArray | None = None
 ) -> tuple[list[int], dict[int, FloatArray]]:
-    """Numbers of the columns (m, c) of which more than the share `least` is independent of the chosen ones.
-
-    The first well determined ones are chosen, then of the others those that are independent of these. A column that is
-    almost a combination of those before it would need values outside of the linear range for what a later one makes.
+    """Numbers of the columns (m, c) of which more than the share `least` is independent of the chosen ones before.
 
     allowed (c,): which may be chosen; basis (m, b): orthonormal columns that are chosen already. Returns also
-    {number: combination (k,) of the chosen} of the columns that are not chosen.
+    {number: combination (k,) of the chosen before it} of the columns that are not chosen.
     """
-    basis, chosen = np.zeros((len(columns), 0)) if basis is None else basis, set[int]()
-    for share in (max(least, _WELL_DETERMINED), least):
-        for number, column in enumerate(columns.T):
-            size = np.linalg.norm(column)
-            if number in chosen or not allowed[number] or not size > least:
-                continue
-            left = column - basis @ (basis.T @ column)
-            left -= basis @ (basis.T @ left)
-            if np.linalg.norm(left) > share * size:
-                basis = np.column_stack([basis, left / np.linalg.norm(left)])
-                chosen.add(number)
-    result = sorted(chosen)
-    others = [number for number in range(columns.shape[1]) if number not in chosen]
-    combinations = np.linalg.lstsq(columns[:, result], columns[:, others], rcond=None)[0]
-    return result, dict(zip(others, combinations.T, strict=True))
+    basis, chosen, combined = np.zeros((len(columns), 0)) if basis is None else basis, [], {}
+    for number, column in enumerate(columns.T):
+        left = column - basis @ (basis.T @ column)
+        left -= basis @ (basis.T @ left)
+        size = np.linalg.norm(column)
+        if allowed[number] and size > least and np.linalg.norm(left) > least * size:
+            basis = np.column_stack([basis, left / np.linalg.norm(left)])
+            chosen.append(number)
+        else:
+            combined[number] = np.linalg.lstsq(columns[:, chosen], column, rcond=None)[0]
+    return chosen, combined
 
 
 def in_words(combination: FloatArray, names: Sequence[str]) -> str:

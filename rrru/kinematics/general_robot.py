@@ -103,7 +103,7 @@ class GeneralRobot(Robot):
         allowed = [candidate.name in names for candidate in candidates]
         chosen, combined = choose(columns.reshape(-1, len(sizes)) * sizes, allowed, least)
         replaced = {
-            candidates[number].name: combination * sizes[chosen] / sizes[number]
+            candidates[number].name: combination * sizes[chosen[: len(combination)]] / sizes[number]
             for number, combination in combined.items()
         }
         return tuple(candidates[k] for k in chosen), replaced
