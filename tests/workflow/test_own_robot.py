@@ -12,6 +12,7 @@ from rrru.campaign import measurements as rows
 from rrru.errors import ConfigError
 from rrru.kinematics.base_parameters import direction
 from rrru.robots.catalogue import make_mechanism
+from rrru.robots.drive_words import drive_words
 from tests.formats import humanoid
 from tests.places import ROOT
 from tests.refusals import refusals
@@ -210,7 +211,8 @@ def test_the_example_hexapod_of_an_mjcf_file_goes_the_whole_way(tmp_path):
     )
     assert set(hexapod.parts.columns) <= set(result["measurements"])
     verdict = result["gap_verdicts"].iloc[0]
-    assert "backlash" in verdict["effects"] and verdict["where"].startswith(hexapod.parts.drives[0].site)
+    legs = drive_words(hexapod).all_names
+    assert "backlash" in verdict["effects"] and verdict["where"].startswith(legs[0])
     own = {"mjcf": str(tmp_path / "results/campaigns/own/corrected.xml"), "platform": "plate"}
     corrected = make_mechanism("h", own, parameter_set="zero")
     drives = pd.read_parquet(tmp_path / "results/campaigns/own/corrected_drives.parquet")
