@@ -184,7 +184,7 @@ def test_what_a_result_writes_is_what_it_holds(arm, tmp_path, monkeypatch, large
     large = {place.stem for place in drawn if place.stat().st_size > files.LARGEST_SVG}
     assert large == {place.stem for place in (tmp_path / "figures/arm").glob("*.png")}
     assert len(large) < len(drawn) or largest
-    assert (b"data:image/png" in page.read_bytes()) is bool(large)
+    assert (b'src="data:image/png' in page.read_bytes()) is bool(large)
     assert diagnosis.write(tmp_path / "all", ("pdf", "png")).read_bytes() == page.read_bytes()
     for name in ("gap_budget", "gap_parameters", "gap_attribute"):
         stored = pd.read_parquet(page.with_name(f"{name}.parquet"))

@@ -460,10 +460,10 @@ def draw_budget(axes: Axes, rows: pd.DataFrame) -> None:
     others = [part for kind in _KIND_COLOURS for part in shown[shown["kind"] == kind].to_dict("records")]
     covariance = float(rows.loc[rows["kind"] == "covariance", "share"].sum())
     limits = min(covariance, 0.0), max(shown["share"].sum() + max(covariance, 0.0), 1.0)
-    # where names above and below the bar end so far
-    taken = dict.fromkeys(_NAME_HEIGHTS, limits[0])
+    # names that a part has no place for, from left to right, and its middle
+    names: list[tuple[str, float]] = []
     if covariance < 0.0:
-        _covariance(axes, covariance, 0.0, limits, taken)
+        names += _covariance(axes, covariance, 0.0)
     start = 0.0
     for number, part in enumerate([*effects.to_dict("records"), *others]):
         colour = _KIND_COLOURS.get(part["kind"], _EFFECT_COLOURS[number % len(_EFFECT_COLOURS)])
@@ -477,10 +477,11 @@ def draw_budget(axes: Axes, rows: pd.DataFrame) -> None:
             ink = "white" if colour == style.BLUE else "black"
             axes.text(middle, 0.1, text, ha="center", va="center", fontsize=7.0, color=ink, in_layout=False)
         elif part["share"] > _NAMED_PART:
-            _name(axes, text, middle, limits, taken)
+            names.append((text, middle))
         start += part["share"]
     if covariance > 0.0:
-        _covariance(axes, covariance, start, limits, taken)
+        names += _covariance(axes, covariance, start)
+    _write_names(axes, names, limits)
     axes.set(xlim=limits, ylim=(-0.75, 0.75), yticks=[])
     axes.set(xlabel="share of the gap's mean square", ylabel="budget")
     for side in ("left", "right", "top"):
@@ -492,22 +493,34 @@ def _width(text: str, limits: _Limits) -> float:
     return _LETTER_SHARE * len(text) * (limits[1] - limits[0])
 
 
-def _name(axes: Axes, text: str, middle: float, limits: _Limits, taken: dict[float, float]) -> None:
-    """Write the name of a part above or below its middle, where no other one is, within the limits of the bar."""
-    width = _width(text, limits)
-    wanted = max(min(middle - 0.5 * width, limits[1] - width), limits[0])
-    height = min(taken, key=lambda one: max(taken[one] - wanted, 0.0))
-    left = max(wanted, taken[height])
-    taken[height] = left + width
-    axes.text(left, height, text, ha="left", va="bottom" if height > 0.0 else "top", fontsize=7.0, in_layout=False)
+def _write_names(axes: Axes, names: Sequence[tuple[str, float]], limits: _Limits) -> None:
+    """Write names above or below the middles of their parts, where no other one is, within the limits of the bar.
+
+    Each is as far to the right as those before it need, then as far to the left as those after it need.
+    """
+    lines: dict[float, list[tuple[str, float]]] = {height: [] for height in _NAME_HEIGHTS}
+    ends = dict.fromkeys(_NAME_HEIGHTS, limits[0])
+    for text, middle in names:
+        wanted = max(min(middle - 0.5 * _width(text, limits), limits[1] - _width(text, limits)), limits[0])
+        height = min(ends, key=lambda one: max(ends[one] - wanted, 0.0))
+        lines[height].append((text, max(wanted, ends[height])))
+        ends[height] = lines[height][-1][1] + _width(text, limits)
+    for height, line in lines.items():
+        end = limits[1]
+        for text, left in reversed(line):
+            end = min(left, end - _width(text, limits))
+            side = "bottom" if height > 0.0 else "top"
+            axes.text(end, height, text, ha="left", va=side, fontsize=7.0, in_layout=False)
 
 
-def _covariance(axes: Axes, share: float, start: float, limits: _Limits, taken: dict[float, float]) -> None:
-    """Draw the covariances of all parts, whose shares sum up to `share`, as one part from `start` on."""
+def _covariance(axes: Axes, share: float, start: float) -> list[tuple[str, float]]:
+    """Draw the covariances of all parts, whose shares sum up to `share`, as one part from `start` on; its name, if any,
+    and its middle.
+    """
     if abs(share) <= _LEAST_PART:
-        return
+        return []
     look: style.Look = {"facecolor": "white", "edgecolor": "#777777", "hatch": _HATCH, "linewidth": 0.6}
     axes.barh(0.0, share, left=start, height=0.6, **look)
-    if abs(share) > _NAMED_PART:
-        text = f"covariance {100.0 * share:.0f} %".replace("-", "\N{MINUS SIGN}")
-        _name(axes, text, start + 0.5 * share, limits, taken)
+    if abs(share) <= _NAMED_PART:
+        return []
+    return [(f"covariance {100.0 * share:.0f} %".replace("-", "\N{MINUS SIGN}"), start + 0.5 * share)]
