@@ -75,6 +75,8 @@ _RING: style.Look = {
 _KIND_COLOURS = {"scatter": "#aaaaaa", "runs": "#cccccc", "unexplained": "#d55e00", "calibration": "#eeeeee"}
 # of the products of two parts, which complete the parts to the whole
 _HATCH = "/////"
+# a part of so many times the whole is cancelled by others: its size says nothing
+_MOST_SHARE = 3.0
 _EFFECT_COLOURS = (style.BLUE, "#56b4e9", "#009e73", "#cc79a7", "#f0e442", "#0072b2")
 # parts of a smaller share are not drawn, or not named; names stand inside of parts wider than this for each letter
 _LEAST_PART, _NAMED_PART, _LETTER_SHARE = 0.01, 0.03, 0.0125
@@ -453,12 +455,17 @@ def draw_budget(axes: Axes, rows: pd.DataFrame) -> None:
     """Parts of `gap_budget` one after the other: effects by share, then what does not repeat, runs and the unknown.
 
     A thin line in each part is its 95 % interval, counted from the part's beginning. Covariances of parts (hatched)
-    complete them to 1; negative ones extend to the left of 0.
+    complete them to 1; negative ones extend to the left of 0. Where parts are many times the whole, a note says so.
     """
     shown = rows[(rows["share"] > _LEAST_PART) & ~rows["kind"].isin(["covariance", "sampling"])]
     effects = shown[shown["kind"] == "effect"].sort_values("share", ascending=False)
     others = [part for kind in _KIND_COLOURS for part in shown[shown["kind"] == kind].to_dict("records")]
     covariance = float(rows.loc[rows["kind"] == "covariance", "share"].sum())
+    if shown["share"].max() > _MOST_SHARE:
+        text = "no shares: parts that cancel each other are many times as large as the gap"
+        axes.text(0.5, 0.5, text, transform=axes.transAxes, ha="center", va="center")
+        axes.set_axis_off()
+        return
     limits = min(covariance, 0.0), max(shown["share"].sum() + max(covariance, 0.0), 1.0)
     # names that a part has no place for, from left to right, and its middle
     names: list[tuple[str, float]] = []

@@ -318,6 +318,14 @@ def test_without_an_error_over_a_drive_s_value_the_figure_says_so(frames):
     assert figure.texts[0].get_text() == "no effect over a drive's value was found"
 
 
+def test_parts_that_cancel_each_other_have_no_bars(frames):
+    """Where data determine a sum only, each part may be drawn thirty times as large as the whole."""
+    budget = frames["gap_budget"]
+    share = budget["share"].mask(budget["part"] == "link_flexure", 30.0).mask(budget["kind"] == "covariance", -29.0)
+    axes = draw("gap", frames | {"gap_budget": budget.assign(share=share)}).axes[1]
+    assert not axes.patches and "no shares" in axes.texts[0].get_text()
+
+
 @pytest.mark.parametrize("covariance", [-0.55, 0.2])
 def test_names_of_the_budget_neither_overlap_nor_leave_the_bar(covariance):
     """With small parts next to each other, and with covariances left of 0."""
