@@ -18,6 +18,7 @@ from rrru.diagnosis.evidence import ModelEvidence
 from rrru.diagnosis.hypothesis import Hypothesis
 from rrru.diagnosis.inference import InferenceResult
 from rrru.diagnosis.options import OPTIONS
+from rrru.diagnosis.state import LeftByCalibration
 from rrru.diagnosis.terms import signatures, spread
 from rrru.estimation.noise_model import CONTRADICTED, NoiseModel
 
@@ -29,7 +30,7 @@ def budget(
     inference: InferenceResult, stated_mm: float | None, generator: np.random.Generator, draws: int
 ) -> pd.DataFrame:
     """Rows of `gap_budget` without the campaign; stated_mm: the instrument's noise per axis, None where unknown."""
-    left = _LeftByCalibration(inference.evidence.linear.calibration_basis, inference.problem.on_robot)
+    left = LeftByCalibration(inference.evidence.linear.calibration_basis, inference.problem.on_robot)
     squares, acting, products = _drawn(inference, left, generator, draws)
     instrument_mm2, noise = _noise_parts(inference, stated_mm, generator, draws)
     residual = inference.problem.residual(inference.calibrated)
@@ -72,7 +73,7 @@ def _row(
 
 
 def _drawn(
-    inference: InferenceResult, left: "_LeftByCalibration", generator: np.random.Generator, draws: int
+    inference: InferenceResult, left: LeftByCalibration, generator: np.random.Generator, draws: int
 ) -> tuple[dict[str, FloatArray], dict[str, BoolArray], dict[tuple[str, str], FloatArray]]:
     """Draws (b,) of mean squares, of effects and of what is unexplained, by name, in which of them each acts, and draws
     of products of two of them.
@@ -105,40 +106,17 @@ def _drawn(
     return squares, acting, products
 
 
-class _LeftByCalibration:
-    """Residuals of a calibration of an orthonormal basis (3m, r), at those of the m readings that count.
-
-    taken: share of the noise that it absorbs there.
-    """
-
-    def __init__(self, basis: FloatArray, counted: BoolArray) -> None:
-        self._basis = basis
-        self._counted = np.repeat(counted, 3)
-        self.taken = float((self._basis[self._counted] ** 2).sum() / self._counted.sum())
-
-    def residual(self, numbers: FloatArray) -> FloatArray:
-        """Residuals (3n, k) at the readings that count, of numbers (3m, k) at all readings."""
-        return numbers[self._counted] - self._basis[self._counted] @ (self._basis.T @ numbers)
-
-    def error(self, generator: np.random.Generator, draws: int) -> FloatArray:
-        """Draws (b,) of the mean square of its error, for noise of unit variance per axis."""
-        # squares of independent combinations of its parameters
-        powers = np.linalg.eigvalsh(self._basis[self._counted].T @ self._basis[self._counted])
-        made = np.maximum(powers, 0.0) @ generator.standard_normal((len(powers), draws)) ** 2
-        return np.asarray(3.0 * made / self._counted.sum())
-
-
 def _parts(
     evidence: ModelEvidence,
     hypothesis: Hypothesis,
     level: int,
-    left: _LeftByCalibration,
+    left: LeftByCalibration,
     generator: np.random.Generator,
     count: int,
 ) -> dict[str, FloatArray]:
     """By effect of a hypothesis its part of the gap (3n, count) beyond the calibration, at drawn coefficients.
 
-    left: a _LeftByCalibration. Those of discrepancy functions together are the unexplained part.
+    left: a LeftByCalibration. Those of discrepancy functions together are the unexplained part.
     """
     if not hypothesis.terms:
         return {}

@@ -15,6 +15,7 @@ from rrru.diagnosis.drive_spectra import jumps, over_range
 from rrru.diagnosis.evidence import ModelEvidence
 from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.problem import DiagnosisProblem
+from rrru.diagnosis.state import LeftByCalibration
 from rrru.diagnosis.terms import EffectTerm, signatures, spread
 from rrru.diagnosis.whitened import discrepancy_scales, spectrum
 from rrru.estimation.cross_validation import (
@@ -142,14 +143,14 @@ class HeldOut:
             out = self.fold == number
             for k, (block, first) in enumerate(zip(blocks, ends, strict=False)):
                 parts[out, :, k] = block[out] @ fit.mean[first : first + block.shape[-1]]
-        basis = linear.calibration_basis
-        flat = np.concatenate([parts, linear.data[..., None]], axis=-1).reshape(len(basis), -1)
-        left = (flat - basis @ (basis.T @ flat)).reshape(*linear.data.shape, -1)[rows]
-        gap = left[..., -1]
-        taken = float((basis.reshape(*linear.data.shape, -1)[rows] ** 2).sum() / gap.size)
-        total = float((gap**2).sum()) - gap.size * self.problem.noise_mm**2 * (1.0 - taken)
+        calibrated = LeftByCalibration(linear.calibration_basis, rows)
+        left = calibrated.residual(
+            np.concatenate([parts, linear.data[..., None]], axis=-1).reshape(linear.data.size, -1)
+        )
+        gap = left[:, -1]
+        total = float(gap @ gap) - gap.size * self.problem.noise_mm**2 * (1.0 - calibrated.taken)
         inverse = 1.0 / total if total > 0.0 else 0.0
-        return {term.effect: float((left[..., k] * gap).sum()) * inverse for k, term in enumerate(terms)}
+        return {term.effect: float(left[:, k] @ gap) * inverse for k, term in enumerate(terms)}
 
     def spread_at_new_stops(
         self, terms: Sequence[EffectTerm], prior_scales: Sequence[float] | FloatArray, level: int

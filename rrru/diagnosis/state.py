@@ -110,3 +110,26 @@ class LinearizedProblem:
             shape_columns={name: values[rows] for name, values in self.shape_columns.items()},
             by_weight={key: values[rows] for key, values in self.by_weight.items()},
         )
+
+
+class LeftByCalibration:
+    """Residuals of a calibration of an orthonormal basis (3m, r), at those of the m readings that count.
+
+    taken: share of the noise that it absorbs there.
+    """
+
+    def __init__(self, basis: FloatArray, counted: BoolArray) -> None:
+        self._basis = basis
+        self._counted = np.repeat(counted, 3)
+        self.taken = float((self._basis[self._counted] ** 2).sum() / self._counted.sum())
+
+    def residual(self, numbers: FloatArray) -> FloatArray:
+        """Residuals (3n, k) at the readings that count, of numbers (3m, k) at all readings."""
+        return numbers[self._counted] - self._basis[self._counted] @ (self._basis.T @ numbers)
+
+    def error(self, generator: np.random.Generator, draws: int) -> FloatArray:
+        """Draws (b,) of the mean square of its error, for noise of unit variance per axis."""
+        # squares of independent combinations of its parameters
+        powers = np.linalg.eigvalsh(self._basis[self._counted].T @ self._basis[self._counted])
+        made = np.maximum(powers, 0.0) @ generator.standard_normal((len(powers), draws)) ** 2
+        return np.asarray(3.0 * made / self._counted.sum())
