@@ -95,11 +95,12 @@ class _DriveNames(TypedDict):
 def gap(tables: Tables, options: Options) -> Figure:
     """The gap between the calibrated model and the measurement. On top its budget: the share of its mean square that
     each effect makes, that does not repeat, and that nothing explains, with 95 % intervals as thin lines; covariances
-    of confounded parts (hatched) complete them to 1. The probability in the headline is that of exactly these causes,
-    of a group alone that one of it acts. (a) Where: measured minus calibrated model at the points from above and from
-    the side, magnified as stated. (b) Why: probability of every effect, those of the verdict in colour, those of a
-    group hatched. (c) Remaining gap: at points that the fit has not used, under the calibrated and the corrected model,
-    with the explained fraction of its mean square. (d) Residual of every point.
+    of confounded parts (hatched) complete them to 1; a note is there where parts cancel each other. The probability
+    in the headline is that of exactly these causes, of a group alone that one of it acts. (a) Where: measured minus
+    calibrated model at the points from above and from the side, magnified as stated. (b) Why: probability of every
+    effect, those of the verdict in colour, those of a group hatched. (c) Remaining gap: at points that the fit has
+    not used, under the calibrated and the corrected model, with the explained fraction of its mean square. (d)
+    Residual of every point.
     """
     campaign, frames = options["campaign"], {}
     for name in ("gap_verdicts", "gap_attribute", "gap_shrink", "gap_budget"):
