@@ -1,5 +1,6 @@
 """Ingest of a measured campaign: an instrument's CSV or parquet file becomes a measurement table or is refused."""
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import partial
@@ -33,6 +34,9 @@ from rrru.campaign.ingest.target_placement import TargetPlacement, check_turned,
 from rrru.campaign.measurements import command, measured, turn_columns, turns, vector_columns
 from rrru.errors import ConfigError, FitError, GrossFileError, MistakeError
 from rrru.kinematics.robot import Robot
+
+# names of columns of drive values, which end in an angle's unit
+_OF_DRIVES = re.compile(r"(_|\b)(rad|deg|degrees?)\W*$", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
@@ -101,6 +105,12 @@ def _read(spec: IngestSpec, mechanism: Robot) -> tuple[Sheet, list[str]]:
     if extra:
         notes.append(f"undeclared columns left out: {', '.join(extra)}")
     drives = [*mechanism.parts.columns]
+    if not set(drives) & set(found) and (others := [name for name in extra if _OF_DRIVES.search(name)]):
+        own = " to ".join(dict.fromkeys((drives[0], drives[-1])))
+        notes.append(
+            f"{', '.join(others)} look like drive values, and those of {mechanism.name} are {own}: see that `robot` is "
+            "right"
+        )
     spec.check_drives(drives)
     frame = spec.as_meant(convert(spec, mechanism, found, cells, problems), drives)
     if spec.targets and "target" not in frame:

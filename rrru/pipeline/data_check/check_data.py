@@ -108,8 +108,8 @@ def _check(
     arguments = {key: value for key, value in (("robot", robot), ("commands", commands)) if value}
     given = {"robot": None, "ingest": str(file)} | section | arguments
     if given["robot"] not in config["robots"]:
-        named = f"robot is {given['robot']!r}" if given["robot"] else "say which robot: --robot .. (ROBOT=..)"
-        known = f"allowed: {', '.join(config['robots'])}, or a URDF or MJCF file, or one of a --config file (CONFIG=..)"
+        named = f"robot is {given['robot']!r}" if given["robot"] else "say which robot: --robot .."
+        known = f"allowed: {', '.join(config['robots'])}, or a URDF or MJCF file, or one of a --config file"
         fitting = fitting_robots(given, config)
         raise ConfigError(f"{named}; {known}" + (f"; this file fits {' and '.join(fitting)}" if fitting else ""))
     found = propose(given, config, begin)

@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 from rrru.campaign.ingest.campaign_file import IngestSpec, ingest
 from rrru.campaign.ingest.checks import number_runs
 from rrru.errors import ConfigError, IngestError
+from rrru.robots.catalogue import make_mechanism
 from rrru.robots.delta import Delta
 from rrru.robots.ptt3 import Ptt3
 from rrru.robots.rrru3 import Rrru3
@@ -148,6 +149,17 @@ def test_undeclared_columns_can_be_left_out(field, expected, tmp_path):
     result = ingest(IngestSpec(written(field.assign(humidity=40.0), tmp_path / "f.csv"), extra_columns="ignore"), ROBOT)
     same(result.measurements, expected)
     assert result.notes == ("undeclared columns left out: humidity",)
+
+
+def test_drive_values_of_another_robot_are_doubted(tmp_path):
+    """The arm reaches the positions of a 3-RRRU; three drive angles that are not its own are no reason to trust it."""
+    arm = make_mechanism("arm6", {"urdf": str(DATA / "models/arm6.urdf")}, parameter_set="zero")
+    spec = IngestSpec(str(DATA / "field_01.csv"), extra_columns="ignore")
+    said = [note for note in ingest(spec, arm).notes if note.endswith("see that `robot` is right")]
+    assert said == [
+        "theta1_rad, theta2_rad, theta3_rad look like drive values, and those of arm6 are axis1_rad to axis6_rad: "
+        "see that `robot` is right"
+    ]
 
 
 def test_text_files_of_other_systems_are_taken(expected, tmp_path):

@@ -255,7 +255,7 @@ def test_the_printed_overlay_is_the_proposed_one_whatever_the_file_is_called(ste
     [
         (["nothere.csv", "--robot", "rrru3"], "no such file", cli.WRONG),
         (["data", "--robot", "rrru3"], "data: is a folder", cli.WRONG),
-        (["data/field_12.csv"], "say which robot: --robot .. (ROBOT=..); allowed: rrru3", cli.WRONG),
+        (["data/field_12.csv"], "say which robot: --robot ..; allowed: rrru3", cli.WRONG),
         (["data/field_12.csv"], "this file fits rrru3", cli.WRONG),
         (["data/field_01.csv", "--robot", "rrru9"], "robot 'rrru9': there is no such file", cli.WRONG),
         (["data/field_01.csv", "--robot", "rrru3", "--config", "nothere.yaml"], "nothere.yaml", cli.WRONG),
