@@ -346,14 +346,14 @@ def resampled_groups(problem: DiagnosisProblem) -> IntArray:
     return np.asarray(run * (len(run) + 1) + within(run, problem.stop) // OPTIONS.points_per_stretch)
 
 
-def resampled_quantiles(problem: DiagnosisProblem) -> tuple[float, float]:
+def resampled_quantiles(groups: IntArray) -> tuple[float, float]:
     """Quantiles of statistics of `resampled_rows` between which their 95 % interval is.
 
-    Resampling n groups makes the variance n / (n - 1) too small and knows no uncertainty of it. The quantiles are those
+    groups: labels of `resampled_groups` of the readings that the statistics are of. Resampling n groups makes the variance n / (n - 1) too small and knows no uncertainty of it. The quantiles are those
     of the normal distribution at sqrt(n / (n - 1)) times the quantiles of Student's t of n - 1 degrees of freedom
     (T. Hesterberg, What teachers should know about the bootstrap, The American Statistician 69, 2015, section 3.3).
     """
-    count = len(np.unique(resampled_groups(problem)))
+    count = len(np.unique(groups))
     if count < 2:
         return 0.0, 1.0
     low, high = (

@@ -9,9 +9,8 @@ import pandas as pd
 
 from rrru.arrays import BoolArray, FloatArray, IntArray
 from rrru.diagnosis.aliases import Row
-from rrru.diagnosis.heldout import HeldOut, resampled_rows
+from rrru.diagnosis.heldout import HeldOut, resampled_groups, resampled_quantiles, resampled_rows
 from rrru.diagnosis.inference import InferenceResult
-from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.problem import DiagnosisProblem
 from rrru.diagnosis.terms import EffectTerm
 
@@ -23,7 +22,8 @@ class ShrinkStep:
     """The gap after some effects are added, at those of m readings that count.
 
     squares_mm2 (m,): of the gap at each reading, less noise. For b draws: picks (b, m), readings resampled from all;
-    shown_mm2 (m,): their part from the residuals; moved_mm2 (b, m): their part from drawn numbers.
+    shown_mm2 (m,): their part from the residuals; moved_mm2 (b, m): their part from drawn numbers. groups (m,): labels
+    of the readings that are resampled together.
     """
 
     added: str
@@ -31,6 +31,7 @@ class ShrinkStep:
     residual_mm: FloatArray
     squares_mm2: FloatArray
     picks: IntArray
+    groups: IntArray
     shown_mm2: FloatArray
     moved_mm2: FloatArray
     counted: BoolArray
@@ -103,7 +104,7 @@ def shrink_steps(
     and redraw the fitted numbers.
     """
     problem, hypothesis, level = inference.problem, inference.hypothesis, inference.level
-    picks, result = resampled_rows(problem, generator, draws), []
+    picks, groups, result = resampled_rows(problem, generator, draws), resampled_groups(problem), []
     for count in range(len(ordered) + 1):
         terms = ordered[:count]
         last = count == len(ordered)
@@ -123,6 +124,7 @@ def shrink_steps(
                 residual_mm=prediction.residual_mm,
                 squares_mm2=squares,
                 picks=picks,
+                groups=groups,
                 shown_mm2=weight * shown,
                 moved_mm2=(1.0 - weight) * moved,
                 counted=problem.on_robot,
@@ -132,11 +134,15 @@ def shrink_steps(
 
 
 def share_closed(before: ShrinkStep, after: ShrinkStep) -> tuple[float, float, float]:
-    """Explained fraction between two steps and its 95 % interval from their draws; zero where there was no gap."""
+    """Explained fraction between two steps and its 95 % interval from their draws, see `resampled_quantiles`.
+
+    Zero where there was no gap.
+    """
     share = _share(before.gap_rms_mm, after.gap_rms_mm)
     drawn = zip(before.drawn_rms_mm, after.drawn_rms_mm, strict=True)
     pairs = [_share(*pair) for pair in drawn if np.isfinite(pair).all()]
-    low, high = np.quantile(pairs, OPTIONS.interval_quantiles) if pairs else (np.nan, np.nan)
+    ends = resampled_quantiles(before.groups[before.counted])
+    low, high = np.quantile(pairs, ends) if pairs else (np.nan, np.nan)
     return share, float(np.minimum(low, share)), float(np.maximum(high, share))
 
 

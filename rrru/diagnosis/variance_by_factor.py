@@ -9,7 +9,7 @@ from scipy.special import chdtri
 
 from rrru.arrays import FloatArray, IntArray
 from rrru.diagnosis.aliases import ObjectArray, Row
-from rrru.diagnosis.heldout import resampled_quantiles, resampled_rows
+from rrru.diagnosis.heldout import resampled_groups, resampled_quantiles, resampled_rows
 from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.problem import DiagnosisProblem
 from rrru.robots.drive_words import drive_words
@@ -33,7 +33,7 @@ def variance_by_factor(
     are of the mean square of positions on the robot, those of drives of all that was read, with the noise taken off;
     their 95 % intervals come from resampled runs (stretches where there are fewer than ten), see `resampled_quantiles`.
     """
-    resampled, ends = resampled_rows(problem, generator, draws), resampled_quantiles(problem)
+    resampled, ends = resampled_rows(problem, generator, draws), resampled_quantiles(resampled_groups(problem))
     components = np.where(problem.on_robot[:, None], residual_mm**2, 0.0)
     whole = _Whole(components.sum(axis=1), 3.0 * problem.on_robot.astype(float), problem.noise_mm**2, resampled, ends)
     rows = []
