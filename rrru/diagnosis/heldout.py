@@ -351,8 +351,8 @@ def resampled_quantiles(groups: IntArray) -> tuple[float, float]:
 
     groups: labels of `resampled_groups` of the readings that the statistics are of. Resampling n groups makes the
     variance n / (n - 1) too small and knows no uncertainty of it. The quantiles are those of the normal distribution at
-    sqrt(n / (n - 1)) times the quantiles of Student's t of n - 1 degrees of freedom (T. Hesterberg, What teachers should
-    know about the bootstrap, The American Statistician 69, 2015, section 3.3).
+    sqrt(n / (n - 1)) times the quantiles of Student's t of n - 1 degrees of freedom (T. Hesterberg, What teachers
+    should know about the bootstrap, The American Statistician 69, 2015, section 3.3).
     """
     count = len(np.unique(groups))
     if count < 2:
