@@ -27,7 +27,7 @@ import pandas as pd
 from rrru.calibration.calibrate import Calibration
 from rrru.diagnosis.diagnose import STEPS
 from rrru.diagnosis.diagnose import Diagnosis as CoreDiagnosis
-from rrru.diagnosis.verdict_text import NOT_CORRECTED
+from rrru.diagnosis.verdict_facts import NOT_CORRECTED
 from rrru.errors import ConfigError, IngestError, RrruError, not_a_file
 from rrru.figures.drawing import draw, draw_all
 from rrru.figures.files import figure_paths, with_svg

@@ -1,16 +1,26 @@
-"""The answer of a diagnosis for people and for scripts: sentences in plain words, and the same facts as `verdict.json`.
+"""The answer of a diagnosis for people: sentences in plain words from the facts of `rrru.diagnosis.verdict_facts`.
 
-`rrru/pipeline/verdict.schema.yaml` is its schema. mm, rad; sizes are root mean squares of 3-D distances.
+mm, rad; sizes are root mean squares of 3-D distances.
 """
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
-from typing import Any
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
-import pandas as pd
 
 from rrru.diagnosis.aliases import Facts
+from rrru.diagnosis.design.expected_information import apart
 from rrru.diagnosis.design.run_limits import NO_PAYLOAD, WITHIN_LIMITS
+from rrru.diagnosis.number_text import (
+    capitalized,
+    is_determined,
+    percent,
+    probability,
+    readable,
+    rounded,
+    share_with_interval,
+    small_percent,
+    with_interval,
+)
 from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.result_notes import (
     MASSES_UNKNOWN,
@@ -19,30 +29,16 @@ from rrru.diagnosis.result_notes import (
     ROBOT_REPEATS,
     SUCCESSIVE_ALIKE,
 )
-from rrru.diagnosis.result_tables import acting_places, is_off_zero
-from rrru.diagnosis.verdict import NOT_TESTED, POSSIBLE
-from rrru.effects.causes import cause_texts
+from rrru.diagnosis.result_tables import is_off_zero
+from rrru.diagnosis.verdict import POSSIBLE
 from rrru.effects.protocol import is_per_load
 from rrru.estimation.noise_model import CONTRADICTED
-from rrru.robots.drive_words import DriveWords
 
-SCHEMA = 1
-_VERDICT = ("gap_rms_mm", "gap_after_rms_mm", "share_closed", "share_closed_low", "share_closed_high", "noise_rms_mm")
-_NOISE = ("noise_stated_mm", "noise_correlation", "noise_runs_mm", "noise_from")
-_PART = ("part", "kind", "rms_mm", "share", "share_low", "share_high", "probability")
-_WORST = ("name", "unit", "drive_value", "error", "low_95", "high_95")
-_NUMBER = ("parameter", "place", "unit", "value", "standard_error", "low_95", "high_95", "at_bound")
-_FOLLOWS = ("follows", "explained", "scale", "unit", "rms_mm")
-_RUN = ("run", "kind", "trajectory", "reverse", "speed_mm_s", "payload_kg", "points", "separates", "gain_nats")
-_APART = ("none", "unexplained")
 _OUTSIDE = {"none": "that nothing acts", "unexplained": "something that the library does not hold"}
 _CHECK = (
     "Next: check units, signs and order of the drives, frame and places of targets, and whether the file is of this "
     "robot: `rrru check` names what reconciles them."
 )
-# first words of the column not_in_model where no file was written
-NOT_CORRECTED = "not corrected: "
-_WORDS = DriveWords()
 # units of sentences for those of tables, and the factor: without rows of zeros
 _READABLE = {"1": ("", 1.0), "rad/(N mm)": ("µrad/(N m)", 1e9), "mm/(N mm)": ("µm/(N m)", 1e6)}
 _READABLE |= {"mm/N": ("µm/N", 1e3), "1/K": ("µm/(m K)", 1e6), "mm/s": ("µm/s", 1e3), "rad/s": ("µrad/s", 1e6)}
@@ -63,69 +59,6 @@ _RANDOM = {
 _DOES_NOT_REPEAT = "does not repeat from pass to pass, in the robot or in the instrument: no model can correct it."
 
 
-def answer(
-    campaign: str, verdict: Facts, tables: Mapping[str, pd.DataFrame], drives: DriveWords = _WORDS
-) -> dict[str, Any]:
-    """The facts of one campaign as a mapping, which `rrru.store.json_files` writes.
-
-    verdict: the row of `gap_verdicts` as a mapping; tables: the frames of the other tables of the diagnosis by name;
-    drives: the robot's DriveWords.
-    """
-    budget = [_row(part, _PART) for part in tables["gap_budget"].to_dict("records")]
-    budget = [part | {"probability": _clipped(part["probability"])} for part in budget]
-    names = [name for name in verdict["effects"].split("+") if name not in _APART]
-    facts = {
-        "schema": SCHEMA,
-        "campaign": campaign,
-        "effects": [_effect(name, tables, budget, drives) for name in names],
-        "unnamed": [name for name in verdict["unnamed"].split("+") if name],
-        "unexplained": "unexplained" in verdict["effects"].split("+"),
-        "probability": _clipped(verdict["probability"]),
-        "leg": verdict["leg"] or None,
-        "where": verdict["where"],
-        "confounded_with": [name for name in verdict["confounded_with"].split(", ") if name],
-        "groups": [_group(names.split(" | "), tables, budget) for names in verdict["groups"].split("; ") if names],
-        "searches_apart": verdict["searches_apart"],
-        **_row(verdict, _VERDICT + _NOISE),
-        "unexplained_follows": [_row(row, _FOLLOWS) for row in tables["gap_remainder"].to_dict("records")],
-        "worst_mm": [verdict[f"worst_{axis}_mm"] for axis in "xyz"],
-        "budget": budget,
-        "next": [_row(run, _RUN) for run in tables["gap_next_runs"].to_dict("records")],
-        "undecided": _undecided(verdict["undecided"], drives),
-        **_row(verdict, ("points", "dropped_points")),
-        "left_out": [_row(row, ("reason", "points")) for row in tables["gap_left_out"].to_dict("records")],
-        "not_tested": _not_tested(tables["gap_attribute"]),
-        "notes": [note for note in verdict["notes"].split("; ") if note],
-        "no_answer": verdict["no_answer"],
-        "corrected_file": _corrected_file(verdict),
-    }
-    return facts | {"sentences": sentences(facts)}
-
-
-def _corrected_file(verdict: Facts) -> dict[str, Any] | None:
-    """Residual errors of the robot's corrected file; None where the robot has no file."""
-    known = np.isfinite(verdict["file_error_mm"])
-    if not (known or verdict["not_in_model"]):
-        return None
-    return {
-        **{key: verdict[f"file_{key}"] if known else None for key in ("error_mm", "error_fresh_mm")},
-        "expected_mm": expected_mm(verdict) if known else None,
-        "remainder": verdict["file_remainder"],
-        "headline": verdict["file_headline"],
-        "not_in_model": [one for one in verdict["not_in_model"].split("; ") if one],
-    }
-
-
-def expected_mm(verdict: Facts) -> float:
-    """Error in mm to expect of a corrected file's robot at poses and loads like those measured.
-
-    Its distance from the diagnosed robot and the error of that one at held-out points are independent: squares add.
-    verdict: the row of `gap_verdicts`.
-    """
-    distances = [verdict[key] for key in ("file_error_mm", "file_error_fresh_mm")]
-    return float(np.hypot(np.fmax(*distances), verdict["gap_after_rms_mm"]))
-
-
 def sentences(facts: Facts) -> list[str]:
     """What the facts say, the headline first, for readers who know the robot and no statistics."""
     if facts["no_answer"]:
@@ -135,122 +68,6 @@ def sentences(facts: Facts) -> list[str]:
     said += [_missed(facts), *_causes(facts), *_scatter(facts)]
     said += _left(facts) if facts["effects"] or facts["unnamed"] else []
     return [*said, *_open(facts), *_next(facts)]
-
-
-def readable(name: str) -> str:
-    """The name of an effect, or of several joined by +, as words."""
-    return name.replace("_", " ").replace("+", " + ")
-
-
-def rounded(value: float | None, digits: int = 2) -> str:
-    """A number to some significant digits, without an exponent; "unknown" for None and what is not finite."""
-    if value is None or not np.isfinite(value):
-        return "unknown"
-    if value == 0.0:
-        return "0"
-    places = digits - 1 - int(np.floor(np.log10(abs(value))))
-    return f"{round(value, places):.{max(places, 0)}f}"
-
-
-def with_interval(value: float, low: float, high: float, unit: str = "") -> str:
-    """A number with its 95 % interval, all to two digits of the interval's half width.
-
-    >>> with_interval(0.12014, 0.11902, 0.12126, "mm")
-    '0.1201 mm (95 %: 0.1190 to 0.1213)'
-    """
-    places = 1 - int(np.floor(np.log10(0.5 * (high - low))))
-    # a rounded number below zero that is zero has no sign
-    size, least, most = (f"{round(one, places) + 0.0:.{max(places, 0)}f}" for one in (value, low, high))
-    return f"{size}{' ' if unit else ''}{unit} (95 %: {least} to {most})"
-
-
-def probability(value: float) -> str:
-    """A probability to two digits that claims no certainty."""
-    return "more than 0.99" if value > 0.995 else "less than 0.01" if value < 0.005 else f"{value:.2f}"
-
-
-def percent(share: float) -> str:
-    """A share in per cent, limited to 0 to 100: shares of confounded effects may be beyond."""
-    return f"{100.0 * min(max(share, 0.0), 1.0):.0f} %"
-
-
-def small_percent(share: float) -> str:
-    """A share in per cent that is not rounded to nothing."""
-    return "less than 1 %" if 0.0 < share < 0.005 else percent(share)
-
-
-def share_with_interval(part: Facts, follow: str = "") -> str:
-    """The share of a part of the budget, or of an effect, with its 95 % interval; no number where that says nothing."""
-    if not is_determined(part):
-        return f"an undetermined share{follow}"
-    return f"{percent(part['share'])}{follow} (95 %: {percent(part['share_low'])} to {percent(part['share_high'])})"
-
-
-def is_determined(part: Facts) -> bool:
-    """Whether the 95 % interval of a share covers so little of 0 to 1 that the share says something."""
-    low, high = (min(max(part[end], 0.0), 1.0) for end in ("share_low", "share_high"))
-    return not high - low >= OPTIONS.max_share_interval
-
-
-def _row(values: Facts, names: Iterable[str]) -> dict[str, Any]:
-    """Some entries of a mapping."""
-    return {name: values[name] for name in names}
-
-
-def _clipped(value: float) -> float:
-    """A probability that is a sum without what rounding adds to 1; NaN stays."""
-    return value if np.isnan(value) else min(value, 1.0)
-
-
-def _effect(
-    name: str, tables: Mapping[str, pd.DataFrame], budget: Sequence[Facts], drives: DriveWords
-) -> dict[str, Any]:
-    """Facts of one effect of the verdict."""
-    share = next((part for part in budget if part["part"] == name and part["kind"] == "effect"), {})
-    cause = tables["gap_attribute"].set_index("effect").loc[name]
-    legs = cause["legs"] if isinstance(cause["legs"], str) else ""
-    numbers = tables["gap_parameters"].query("effect == @name").to_dict("records")
-    leg = (int(legs),) if legs.isdigit() else ()
-    places = tables["gap_drive_functions"].query("effect == @name and worst")
-    # of an effect of one leg its largest error is that of its drive
-    places = places[places["drive"].isin(leg or places["drive"])]
-    return {
-        "name": name,
-        **vars(cause_texts(name, drives, leg)),
-        "probability": _clipped(cause["probability"]),
-        "decision": cause["decision"],
-        "legs": legs,
-        "place": drives.place(*leg) if leg else _places(numbers),
-        **{key: share.get(key) for key in ("rms_mm", "share", "share_low", "share_high")},
-        "parameters": [_row(number, _NUMBER) for number in numbers],
-        "worst_places": [_row(place, _WORST) for place in places.to_dict("records")],
-    }
-
-
-def _places(numbers: Sequence[Facts]) -> str:
-    """Where an effect acts whose parameters, rows of `gap_parameters`, each belong to one of several legs or drives."""
-    places = [place.partition(" ") for place in acting_places(numbers)]
-    return f"{places[0][0]} {', '.join(name for _, _, name in places)}" if places else ""
-
-
-def _group(names: list[str], tables: Mapping[str, pd.DataFrame], budget: Sequence[Facts]) -> dict[str, Any]:
-    """Facts of a group of confounded causes."""
-    causes = tables["gap_attribute"].set_index("effect").loc[names]
-    # they exclude each other, or nearly so
-    parts = [part for part in budget if part["kind"] == "effect" and part["part"] in names]
-    return {
-        "names": names,
-        "probabilities": [_clipped(float(one)) for one in causes["probability"]],
-        "probability": _clipped(float(causes["group_probability"].iloc[0])),
-        "rms_mm": float(np.linalg.norm([part["rms_mm"] for part in parts])),
-        "share": sum(part["share"] for part in parts),
-    }
-
-
-def _not_tested(causes: pd.DataFrame) -> list[dict[str, str]]:
-    """Effects that have no probability, with the reason, from rows of `gap_attribute`."""
-    rows = causes[causes["decision"] == NOT_TESTED].to_dict("records")
-    return [{"name": row["effect"], "reason": row["note"].removeprefix(f"{NOT_TESTED}: ")} for row in rows]
 
 
 def _no_answer(facts: Facts) -> str:
@@ -404,7 +221,7 @@ def _cause(effect: Facts, follow: str, with_shares: bool, facts: Facts) -> str:
     """One effect: its share, or its size where shares are not determined, name, leg, sizes and meaning."""
     share = "Also there is"
     if effect["share"] is not None:
-        share = f"{_initial(share_with_interval(effect, follow))} is"
+        share = f"{capitalized(share_with_interval(effect, follow))} is"
         share = share if with_shares else f"{rounded(effect['rms_mm'])} mm is"
     # several have their numbers in the table
     place = f" {effect['place']}" if effect["legs"].isdigit() else ""
@@ -461,7 +278,7 @@ def _scatter(facts: Facts) -> list[str]:
         return [f"Some of it {how}"]
     # the interval of a sum is not known
     acting = [part for part in parts if part["share"]]
-    size = _initial(share_with_interval(acting[0])) if len(acting) == 1 else percent(share)
+    size = capitalized(share_with_interval(acting[0])) if len(acting) == 1 else percent(share)
     return [f"{size} {how}"]
 
 
@@ -489,7 +306,7 @@ def _left(facts: Facts) -> list[str]:
 def _open(facts: Facts) -> list[str]:
     """What else may act: the named rivals, and what the advised runs would decide."""
     named = [effect["name"] for effect in facts["effects"]]
-    pairs = [_apart(run["separates"]) for run in facts["next"]]
+    pairs = [apart(run["separates"]) for run in facts["next"]]
     asked = dict.fromkeys(name for sides in pairs for name in sorted(set().union(*sides)))
     # groups have a sentence of their own
     grouped = [name for group in facts["groups"] for name in group["names"]]
@@ -547,41 +364,19 @@ def _next(facts: Facts) -> list[str]:
     return ["Next: no further run that was tried in computation would settle it."]
 
 
-def _undecided(separates: str, drives: DriveWords) -> dict[str, Any] | None:
-    """The two answers that no run decides between, and what to inspect instead of each cause; None where there are
-    none.
-    """
-    if not separates:
-        return None
-    names = sorted(set().union(*_apart(separates)))
-    inspect = [{"name": name, "inspect": cause_texts(name, drives).inspect} for name in names]
-    return {"separates": separates, "inspect": inspect}
-
-
 def _undecidable(facts: Facts) -> str:
     """What would decide between two answers where nothing that can be simulated does: inspection of their causes."""
     undecided = facts["undecided"]
     limited = " within the limits" if any(note.startswith(_LIMITED) for note in facts["notes"]) else ""
     would = " ".join(
-        f"{_initial(readable(one['name']))}: {one['inspect'] or 'add a sensor at the part itself.'}"
+        f"{capitalized(readable(one['name']))}: {one['inspect'] or 'add a sensor at the part itself.'}"
         for one in undecided["inspect"]
     )
     first = f"Next: nothing that can be simulated{limited} would decide {_contest(undecided['separates'])}"
     return f"{first}; inspection would. {would}"
 
 
-def _initial(text: str) -> str:
-    """A text with a capital first letter."""
-    return text[:1].upper() + text[1:]
-
-
 def _contest(separates: str) -> str:
     """The difference between two answers "a+b / a+c", in words."""
-    sides = [" + ".join(map(readable, sorted(side))) for side in _apart(separates)]
+    sides = [" + ".join(map(readable, sorted(side))) for side in apart(separates)]
     return f"between {sides[0]} and {sides[1]}" if all(sides) else f"whether {''.join(sides)} acts"
-
-
-def _apart(separates: str) -> tuple[set[str], set[str]]:
-    """The effects, as two sets, that one of two answers "a+b / a+c" has and the other has not."""
-    first, second = (set(side.split("+")) - {"none"} for side in separates.split(" / "))
-    return first - second, second - first

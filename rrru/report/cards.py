@@ -4,15 +4,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
-from rrru.diagnosis.verdict_text import (
-    NOT_CORRECTED,
-    is_determined,
-    percent,
-    probability,
-    readable,
-    rounded,
-    share_with_interval,
-)
+from rrru.diagnosis.number_text import is_determined, percent, probability, readable, rounded, share_with_interval
+from rrru.diagnosis.verdict_facts import NOT_CORRECTED
 from rrru.report import worth
 from rrru.report.worth import Worth
 

@@ -10,7 +10,7 @@ from typing import TypeAlias
 
 import pandas as pd
 
-from rrru.diagnosis.verdict_text import probability, readable, rounded
+from rrru.diagnosis.number_text import probability, readable, rounded
 from rrru.errors import ConfigError
 from rrru.report import cells, compare, page
 from rrru.report.compare import Difference, GapDifference, Side, gap_difference

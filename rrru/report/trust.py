@@ -5,7 +5,7 @@ from typing import Any
 
 import pandas as pd
 
-from rrru.diagnosis.verdict_text import rounded, with_interval
+from rrru.diagnosis.number_text import rounded, with_interval
 from rrru.estimation.intervals import QUANTILE_95
 from rrru.report.cells import MINUS
 

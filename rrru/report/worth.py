@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import pandas as pd
 
+from rrru.diagnosis.number_text import rounded
 from rrru.diagnosis.shrink import gap_rms
-from rrru.diagnosis.verdict_text import rounded
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from rrru.diagnosis.diagnose import MeasuredRobot, diagnose
 from rrru.diagnosis.make_problem import make_diagnosis_problem
 from rrru.diagnosis.result_notes import MASSES_UNKNOWN, MOUNTING_ASSUMED
 from rrru.diagnosis.settings import GapSettings
-from rrru.diagnosis.verdict_text import answer
+from rrru.diagnosis.verdict_facts import answer
 from rrru.effects import drive_error_function
 from rrru.effects.library import find
 from rrru.robots.from_dh import from_dh

@@ -7,7 +7,7 @@ import pytest
 from rrru.campaign import measurements as rows
 from rrru.diagnosis.diagnose import MeasuredRobot, diagnose
 from rrru.diagnosis.settings import GapSettings
-from rrru.diagnosis.verdict_text import answer
+from rrru.diagnosis.verdict_facts import answer
 from rrru.report.cards import card
 from tests.diagnosis import arms, campaigns
 from tests.schemas import check

@@ -8,10 +8,9 @@ import numpy as np
 import pandas as pd
 import pytest
 import yaml
-from hypothesis import given
-from hypothesis import strategies as st
 
-from rrru.diagnosis import verdict_text
+from rrru.diagnosis import verdict_facts, verdict_text
+from rrru.diagnosis.number_text import rounded
 from rrru.diagnosis.result_notes import (
     REPEATABILITY_UNKNOWN,
     REPEATABILITY_UNSURE,
@@ -47,15 +46,15 @@ def answered(budget=None, runs=(), drives=_LEGS, places=(), follows=(), causes=N
                 ("backlash", "width2", "in leg 2", "rad", 4.04e-4, 0.2e-4, 3.65e-4, 4.43e-4, False),
                 ("backlash", "width3", "in leg 3", "rad", 0.0, np.nan, np.nan, np.nan, False),
             ],
-            columns=("effect", *verdict_text._NUMBER),
+            columns=("effect", *verdict_facts._NUMBER),
         ),
-        "gap_next_runs": pd.DataFrame(list(runs), columns=verdict_text._RUN),
-        "gap_drive_functions": pd.DataFrame(list(places), columns=("effect", "drive", "worst", *verdict_text._WORST)),
-        "gap_remainder": pd.DataFrame(list(follows), columns=verdict_text._FOLLOWS),
+        "gap_next_runs": pd.DataFrame(list(runs), columns=verdict_facts._RUN),
+        "gap_drive_functions": pd.DataFrame(list(places), columns=("effect", "drive", "worst", *verdict_facts._WORST)),
+        "gap_remainder": pd.DataFrame(list(follows), columns=verdict_facts._FOLLOWS),
         "gap_left_out": pd.DataFrame({"reason": ["outlier in the file"], "points": [2]}),
     }
     row = synthetic_gap.gap_verdicts(CAMPAIGN, **verdict).iloc[0].to_dict()
-    return verdict_text.answer(CAMPAIGN, row, tables, drives)
+    return verdict_facts.answer(CAMPAIGN, row, tables, drives)
 
 
 RUN = ("line_1 in reverse", "run", "line_1", True, 80.0, np.nan, 26, "backlash / backlash+servo_lag", 14.0)
@@ -332,7 +331,7 @@ def test_where_shares_are_not_determined_sizes_are_said_and_why(factor, gap, why
     assert "%" not in re.sub(r"\(95 %: [^)]*\)", "", said)
     assert ("too small relative to the noise" in said) == (why == "small")
     assert ("are confounded with each other" in said) == (why == "alike")
-    assert f"{verdict_text.rounded(size)} mm is link flexure" in said
+    assert f"{rounded(size)} mm is link flexure" in said
 
 
 @pytest.mark.parametrize(
@@ -434,41 +433,11 @@ def test_where_nothing_acts_or_the_library_lacks_it_no_effect_is_blamed():
     assert "Parts of the unexplained share could be: drive compliance." in unknown
 
 
-@given(st.floats(1e-7, 1e6), st.integers(1, 5))
-def test_a_rounded_number_is_off_by_half_a_digit_at_most(value, digits):
-    text = verdict_text.rounded(-value, digits)
-    assert abs(float(text) + value) <= 0.5000001 * 10.0 ** (np.floor(np.log10(value)) - digits + 1)
-    assert "e" not in text
-
-
-@pytest.mark.parametrize("value", [None, np.nan, np.inf])
-def test_a_size_that_is_not_known_is_not_zero(value):
-    assert verdict_text.rounded(value) == "unknown" and verdict_text.rounded(0.0) == "0"
-
-
 def test_compliances_of_joints_are_in_microradians_per_newton_metre():
     """6.67e-9 rad/(N mm) = 6.67e-6 rad/(N m)."""
     row = {"parameter": "compliance2", "unit": "rad/(N mm)", "value": 6.67e-9, "standard_error": 6e-11}
     (size,) = verdict_text._sizes([row | {"low_95": 6.55e-9, "high_95": 6.79e-9}])
     assert size == "compliance2 = 6.67 µrad/(N m) (95 %: 6.55 to 6.79)"
-
-
-@given(st.floats(-1e3, 1e3), st.floats(1e-7, 1e2))
-def test_a_number_with_its_interval_is_given_to_two_digits_of_the_half_width(value, half):
-    text = verdict_text.with_interval(value, value - half, value + half, "mm")
-    rounded, low, high = (float(part) for part in re.fullmatch(r"(.+) mm \(95 %: (.+) to (.+)\)", text).groups())
-    rounding = 0.051 * half + 1e-12 * abs(value)
-    assert (
-        abs(rounded - value) <= rounding
-        and abs(low - value + half) <= rounding
-        and abs(high - value - half) <= rounding
-    )
-    assert "-0 " not in text and "e" not in text
-
-
-@pytest.mark.parametrize(("value", "text"), [(1.0, "more than 0.99"), (1e-9, "less than 0.01"), (0.5, "0.50")])
-def test_a_probability_claims_no_certainty(value, text):
-    assert verdict_text.probability(value) == text
 
 
 def test_numbers_of_numpy_and_what_is_not_finite_are_plain_in_a_file(tmp_path):

@@ -20,11 +20,12 @@ from rrru.diagnosis.correction.corrected_file import Corrected, corrected
 from rrru.diagnosis.correction.drive_table import at_rest, corrected_drives, effect_twists
 from rrru.diagnosis.diagnose import Diagnosis
 from rrru.diagnosis.inference import InferenceResult
+from rrru.diagnosis.number_text import readable
 from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.problem import DiagnosisProblem
 from rrru.diagnosis.result_notes import payload_notes
 from rrru.diagnosis.shrink import model_row
-from rrru.diagnosis.verdict_text import NOT_CORRECTED, expected_mm, readable
+from rrru.diagnosis.verdict_facts import NOT_CORRECTED, expected_mm
 from rrru.effects.library import active_effects
 from rrru.effects.protocol import Motion, together
 from rrru.errors import ConfigError, SimulationError, UnreachableError

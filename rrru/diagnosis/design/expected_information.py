@@ -243,3 +243,9 @@ def _answer_pair(favoured: Answer, other: Answer) -> AnswerPair | None:
     # a rival may be possible only together with a small discrepancy
     larger = len(favoured[0].terms) >= len(other[0].terms)
     return AnswerPair(" / ".join(names), *((favoured, other) if larger else (other, favoured)))
+
+
+def apart(separates: str) -> tuple[set[str], set[str]]:
+    """The effects, as two sets, that one of two answers "a+b / a+c" has and the other has not."""
+    first, second = (set(side.split("+")) - {"none"} for side in separates.split(" / "))
+    return first - second, second - first

@@ -10,7 +10,7 @@ from rrru.diagnosis import diagnose as core
 from rrru.diagnosis.design.run_limits import StatedLimits
 from rrru.diagnosis.schemas import TABLES, tables_of
 from rrru.diagnosis.settings import GapSettings
-from rrru.diagnosis.verdict_text import answer
+from rrru.diagnosis.verdict_facts import answer
 from rrru.figures.drawing import draw_all
 from rrru.figures.files import KINDS
 from rrru.kinematics.dynamics import Masses
