@@ -14,6 +14,7 @@ are held (Kanzow, Yamashita and Fukushima, Journal of Computational and Applied 
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -48,6 +49,8 @@ class SolverOptions:
 
 # damping that holds directions that neither readings nor priors determine
 _LEAST_DAMPING = 1e-13
+# gain, as a share of the linearised objective, below which the search for the parameters at bounds ends
+_BOUNDED = 1e-14
 # damping, times two, after the first step that does not lower the objective
 _RETRY_DAMPING = 1e-3
 # the damping decreases by this factor after a step that gains at least this share of the prediction
@@ -264,27 +267,35 @@ class _Linearized:
     high: FloatArray
 
     def step(self, damping: float) -> _Step:
-        """Damped Gauss-Newton _Step within the bounds.
+        """Damped Gauss-Newton _Step within the bounds: the least squares of the linearised problem between them.
 
         Parameters count in units of their priors, those of flat priors by the length of their column; damping: in these
-        units, so that 1 shortens a step to about the priors' standard deviations. A parameter that would leave its
-        bounds is put there, and the others follow.
+        units, so that 1 shortens a step to about the priors' standard deviations. Where one would leave its bounds all
+        are found by Stark's and Parker's bounded-variable least squares (Computational Statistics 10, 1995): it may
+        belong inside of its bounds once others are held at theirs.
         """
         columns, target, count = self.triangle[:, :-1], self.triangle[:, -1], len(self.sd)
         length = np.linalg.norm(columns, axis=0)
         unit = np.where(np.isfinite(self.sd), self.sd, 1.0 / np.where(length > 0.0, length, 1.0))
-        free, step, damped = np.ones(count, dtype=bool), np.zeros(count), np.zeros((1, 1))
-        while free.any():
-            remaining = target + columns[:, ~free] @ step[~free]
-            scaled = np.column_stack([columns[:, free] * unit[free], remaining])
-            brake = np.column_stack([np.sqrt(damping) * np.eye(int(free.sum())), np.zeros(int(free.sum()))])
-            damped = triangle_of(np.concatenate([scaled, brake]))
-            step[free] = -unit[free] * solve_triangular(damped[:-1, :-1], damped[:-1, -1])
-            beyond = free & ((step < self.low) | (step > self.high))
-            if not beyond.any():
-                break
-            step[beyond] = np.clip(step, self.low, self.high)[beyond]
-            free &= ~beyond
+        brake = np.column_stack([np.sqrt(damping) * np.eye(count), np.zeros(count)])
+        whole = np.concatenate([np.column_stack([columns * unit, target]), brake])
+        damped, free = triangle_of(whole), np.ones(count, dtype=bool)
+        step = -unit * solve_triangular(damped[:-1, :-1], damped[:-1, -1])
+        if ((step < self.low) | (step > self.high)).any():
+            found = _between(damped, self.low / unit, self.high / unit)
+            step, free = np.clip(unit * found.x, self.low, self.high), found.active_mask == 0
+            step[~free] = np.where(found.active_mask < 0, self.low, self.high)[~free]
+            damped = triangle_of(whole[:, [*np.flatnonzero(free), count]])
         moved = columns @ step
         slope = -float(target @ moved)
         return _Step(step, slope - 0.5 * float(moved @ moved), slope, free, unit[free], damped[:-1, :-1])
+
+
+def _between(triangle: FloatArray, low: FloatArray, high: FloatArray) -> Any:
+    """Result of `scipy.optimize.lsq_linear` for the triangle (k + 1, k + 1) of columns and residual, between bounds."""
+    from scipy.optimize import lsq_linear
+
+    count = len(low)
+    return lsq_linear(
+        triangle[:-1, :-1], -triangle[:-1, -1], (low, high), method="bvls", tol=_BOUNDED, max_iter=20 * count
+    )

@@ -111,6 +111,19 @@ def test_bounds_hold_and_the_rest_is_fitted_as_if_the_bounded_were_fixed(seed):
     assert found.end.cost == pytest.approx(plain.cost, rel=1e-9)
 
 
+@pytest.mark.parametrize("seed", range(40))
+def test_ill_conditioned_readings_between_bounds_end_where_the_bounded_least_squares_problem_does(seed):
+    """A parameter that leaves its bounds in a step may belong inside of them, once others are held at theirs."""
+    generator = np.random.default_rng(seed)
+    left, right = (np.linalg.qr(generator.standard_normal((count, 7))).Q for count in (78, 7))
+    matrix = left * np.logspace(0.0, -4.0, 7) @ right.T
+    data = matrix @ generator.uniform(-2.0, 2.0, 7) + 0.01 * generator.standard_normal(78)
+    parameters = _block(7, bounds=(-np.ones(7), np.ones(7)))
+    found = solve(Problem(Bent(matrix, data), parameters, lambda v: v / NOISE), [np.zeros(7)])
+    best = optimize.lsq_linear(matrix / NOISE, data / NOISE, (-1.0, 1.0), method="bvls", tol=1e-14, max_iter=200)
+    assert found.end.converged and found.end.cost == pytest.approx(best.cost, rel=1e-9)
+
+
 @pytest.mark.parametrize("loss", [one for one in LOSSES if one != "linear"])
 def test_robust_losses_end_where_scipy_ends(loss):
     problem, _ = _problem(1, loss=loss, outliers=8)
