@@ -8,8 +8,9 @@ from rrru.errors import FitError
 from rrru.robots.rrru3_kernels import forward
 from rrru.studies.rrru3.twin_kernels import parameter_jacobian
 
-# weight in mm of the squared excess over a bound, in half widths: violations are some thousandths
-_STIFFNESS = 10.0
+# weights in mm of the squared excess over a bound, in half widths, one after another: the searches begin outside of the
+# bounds, where a high weight leads nowhere, and end with violations of some 1e-5. The model is linearised for each
+_STIFFNESSES = (10.0, 100.0, 1000.0, 10000.0)
 # Newton steps, the smallest tried share of one, and the gain in mm below which a draw is solved
 _MOST_STEPS, _LEAST_SHARE, _LEAST_GAIN_MM = 60, 1e-3, 1e-7
 _LEAST_DISTANCE_MM, _LEAST_PIVOT = 1e-9, 1e-14
@@ -21,59 +22,66 @@ _vectorised = numba.njit(cache=True, error_model="numpy", fastmath={"reassoc", "
 def linear_fit(mechanism, theta, measured, start):
     """Deviations (d, p) of least mean distance within the mechanism's bounds, and the minima (d,), of d draws.
 
-    The model is linearised once, at the least-squares deviations of the draws' mean. theta, start: (n, 3); measured:
-    (d, n, 3). Raises FitError where the iteration leaves the workspace.
+    The model is linearised at the mean of the draws' deviations, first at those of least squares, then at those found.
+    theta, start: (n, 3); measured: (d, n, 3). Raises FitError where the iteration leaves the workspace.
     """
     parameters, model = mechanism.parameters, (mechanism.nominal_legs, mechanism.azimuth_cos_sin, mechanism.leg_map)
-    centre = measured.mean(axis=0)
-    deviations, residual, jacobian = _least_squares(theta, centre, start, model, (parameters.low, parameters.high))
-    if not np.isfinite(residual).all():
-        raise FitError("the candidate's calibration leaves the workspace")
-    whitened = np.linalg.qr(jacobian.reshape(-1, len(deviations)))
-    back, basis, residual = (
-        np.linalg.inv(whitened.R),
-        whitened.Q.reshape(jacobian.shape),
-        residual + (measured - centre),
-    )
-    # place of the deviations within their bounds, in half widths: middle + over q, violated beyond 1
-    half = 0.5 * (parameters.high - parameters.low)
-    middle, over = (deviations - 0.5 * (parameters.high + parameters.low)) / half, back / half[:, None]
-    start, basis = residual.reshape(len(residual), -1) @ whitened.Q, basis.transpose(2, 1, 0)
-    gram = (basis[:, None] * basis).sum(axis=2)
-    arrays = residual.transpose(0, 2, 1), basis, gram, start, over, middle
-    q, value = _newton(*map(np.ascontiguousarray, arrays))
-    return deviations + q @ back.T, value
+    low, high = parameters.low, parameters.high
+    arrays = np.ascontiguousarray(np.cos(theta).T), np.ascontiguousarray(np.sin(theta).T), theta
+    near, mean = np.ascontiguousarray(start.T), measured.mean(axis=0)
+    centre = _least_squares(arrays, mean, near, model, (low, high))
+    found, half = None, 0.5 * (high - low)
+    for stiffness in _STIFFNESSES:
+        position, jacobian = _linearised(arrays, centre, near, model)
+        if not (np.isfinite(position).all() and np.isfinite(jacobian).all()):
+            raise FitError("the candidate's calibration leaves the workspace")
+        whitened = np.linalg.qr(jacobian.reshape(-1, len(centre)))
+        back, basis = np.linalg.inv(whitened.R), whitened.Q.reshape(jacobian.shape).transpose(2, 1, 0)
+        # place of the deviations within their bounds, in half widths: middle + over q, violated beyond 1
+        middle, over = (centre - 0.5 * (high + low)) / half, back / half[:, None]
+        gram = (basis[:, None] * basis).sum(axis=2)
+        residual = measured - position
+        # from least squares, then from where the last search ended
+        q = residual.reshape(len(residual), -1) @ whitened.Q if found is None else (found - centre) @ whitened.R.T
+        arrays_of_draws = residual.transpose(0, 2, 1), basis, gram, q, over, middle
+        q, value = _newton(stiffness, *map(np.ascontiguousarray, arrays_of_draws))
+        found = centre + q @ back.T
+        centre = np.clip(found.mean(axis=0), low, high)
+    return found, value
 
 
 @numba.njit(cache=True)
-def _least_squares(theta, measured, start, model, bounds):
+def _linearised(arrays, deviations, near, model):
+    """Positions (n, 3) of the model with deviations (p,), and their derivatives (n, 3, p); NaN beyond the workspace."""
+    (cosine, sine, theta), (nominal, turn, leg_map) = arrays, model
+    legs = nominal.copy()
+    for p in range(len(deviations)):
+        legs += leg_map[:, :, p] * deviations[p]
+    position = np.ascontiguousarray(forward(legs.reshape(1, 3, 5), turn, cosine, sine, near)[0].T)
+    return position, parameter_jacobian(position, theta, legs, turn, leg_map)
+
+
+@numba.njit(cache=True)
+def _least_squares(arrays, measured, near, model, bounds):
     """Deviations (p,) of least squares, clipped to bounds (low, high), by three steps of Gauss and Newton.
 
-    With the residuals (n, 3) of measured positions there and the model's derivatives (n, 3, p); residuals are NaN
-    where the iteration leaves the workspace. model: nominal numbers of the legs, their azimuths' cosines and sines, and
-    derivatives of the numbers by the parameters.
+    Of measured positions (n, 3), up to where a step leaves the workspace. arrays: cosines and sines (3, n) of the drive
+    angles and these (n, 3); model: nominal numbers of the legs, their azimuths' cosines and sines, and derivatives of
+    the numbers by the parameters.
     """
-    nominal, turn, leg_map = model
-    cosine, sine = np.ascontiguousarray(np.cos(theta).T), np.ascontiguousarray(np.sin(theta).T)
-    near, deviations = np.ascontiguousarray(start.T), np.zeros(leg_map.shape[2])
-    for step in range(4):
-        legs = nominal.copy()
-        for p in range(len(deviations)):
-            legs += leg_map[:, :, p] * deviations[p]
-        position = np.ascontiguousarray(forward(legs.reshape(1, 3, 5), turn, cosine, sine, near)[0].T)
-        residual = measured - position
-        jacobian = parameter_jacobian(position, theta, legs, turn, leg_map)
-        flat = jacobian.reshape(-1, len(deviations))
+    deviations = np.zeros(model[2].shape[2])
+    for _ in range(3):
+        position, jacobian = _linearised(arrays, deviations, near, model)
+        flat, residual = jacobian.reshape(-1, len(deviations)), (measured - position).ravel()
         if not (np.isfinite(residual).all() and np.isfinite(flat).all()):
-            return deviations, np.full_like(residual, np.nan), jacobian
-        if step < 3:
-            moved = deviations + np.linalg.lstsq(flat, residual.ravel(), RANK_TOLERANCE)[0]
-            deviations = np.minimum(np.maximum(moved, bounds[0]), bounds[1])
-    return deviations, residual, jacobian
+            break
+        moved = deviations + np.linalg.lstsq(flat, residual, RANK_TOLERANCE)[0]
+        deviations = np.minimum(np.maximum(moved, bounds[0]), bounds[1])
+    return deviations
 
 
 @_vectorised
-def _newton(residual, basis, gram, start, back, middle):
+def _newton(stiffness, residual, basis, gram, start, back, middle):
     """Coordinates q (d, p) that minimise the mean distances of residuals (d, 3, n) - q basis (p, 3, n), and the minima.
 
     Damped Newton from least squares, one draw after another; the basis is orthonormal. gram (p, p, n): products of its
@@ -98,7 +106,7 @@ def _newton(residual, basis, gram, start, back, middle):
             place[k] = middle[k]
             for p in range(size):
                 place[k] += back[k, p] * q[p]
-        value = _value(left, moved, 0.0, place, moves)
+        value = _value(left, moved, 0.0, place, moves, stiffness)
         for _ in range(_MOST_STEPS):
             for n in range(points):
                 size_mm = np.sqrt(left[0, n] ** 2 + left[1, n] ** 2 + left[2, n] ** 2)
@@ -119,9 +127,9 @@ def _newton(residual, basis, gram, start, back, middle):
                 excess = place[k] - min(max(place[k], -1.0), 1.0)
                 if excess != 0.0:
                     for p in range(size):
-                        slope[p] -= 2.0 * _STIFFNESS * excess * back[k, p]
+                        slope[p] -= 2.0 * stiffness * excess * back[k, p]
                         for m in range(p + 1):
-                            bend[p, m] += 2.0 * _STIFFNESS * back[k, p] * back[k, m]
+                            bend[p, m] += 2.0 * stiffness * back[k, p] * back[k, m]
             _solve(bend, slope, step)
             moved[:] = 0.0
             _add(moved, step, basis)
@@ -129,10 +137,10 @@ def _newton(residual, basis, gram, start, back, middle):
                 moves[k] = 0.0
                 for p in range(size):
                     moves[k] += back[k, p] * step[p]
-            share, tried = 1.0, _value(left, moved, 1.0, place, moves)
+            share, tried = 1.0, _value(left, moved, 1.0, place, moves, stiffness)
             while not tried < value and share > _LEAST_SHARE:
                 share *= 0.5
-                tried = _value(left, moved, share, place, moves)
+                tried = _value(left, moved, share, place, moves, stiffness)
             if not tried < value:
                 break
             gain, value = value - tried, tried
@@ -178,7 +186,7 @@ def _solve(matrix, right, result):
 
 
 @_vectorised
-def _value(left, moved, share, place, moves):
+def _value(left, moved, share, place, moves, stiffness):
     """Mean distance of residuals left (3, n) after a share of a step, which changes them by -moved, and the penalty."""
     total = 0.0
     for n in range(left.shape[1]):
@@ -189,5 +197,5 @@ def _value(left, moved, share, place, moves):
     total /= left.shape[1]
     for k in range(place.shape[0]):
         at = place[k] + share * moves[k] if share > 0.0 else place[k]
-        total += _STIFFNESS * (at - min(max(at, -1.0), 1.0)) ** 2
+        total += stiffness * (at - min(max(at, -1.0), 1.0)) ** 2
     return total

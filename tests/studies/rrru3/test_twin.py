@@ -203,6 +203,25 @@ def test_the_linearised_fit_keeps_the_bounds_as_the_pipelines_does(rich_poses):
     np.testing.assert_allclose(fast[0] / robot.parameters.high, fit.deviations / robot.parameters.high, atol=4e-2)
 
 
+def test_the_linearised_fit_of_one_line_is_the_pipelines(task):
+    """On one line some combinations are hardly determined: parameters end at their bounds, far from least squares."""
+    plan = task.plan(CANDIDATE)
+    points, robot = plan.targets()[:26], make_mechanism("rrru3", {}, parameter_set="identifiable", length_limit_mm=3.0)
+    theta, generator = robot.require_reachable(points), np.random.default_rng(4)
+    truth = np.array([0.0098, -0.0054, -0.0043, 1.1, 0.6, 1.5, -0.8])
+    # smooth errors that the model lacks, and random ones
+    lacking = np.sin(np.linspace(0.0, 5.0, 26))[:, None] * [0.9, 0.0, -0.7]
+    attained = robot.forward(theta, truth, points) + lacking
+    measured = attained + generator.normal(0.0, 0.2, (6, 26, 3))
+    fast, fast_value = linear_fit(robot, theta, measured, points)
+    for draw, value, deviations in zip(measured, fast_value, fast, strict=True):
+        residuals = TargetPositions(robot, theta, draw, points)
+        fit = least_mean_distance(residuals, calibrate(residuals).deviations)
+        assert np.isclose(np.abs(fit.deviations[3:6]), 3.0).any()
+        assert value == pytest.approx(fit.mean_mm, abs=5e-3)
+        assert residuals.mean_distance(deviations[None])[0] == pytest.approx(fit.mean_mm, abs=5e-3)
+
+
 def test_a_spiral_near_a_singularity_is_refused(task):
     near = twin.Twin(CANDIDATE.values | {"centre_x_mm": -560.0, "radius_end_mm": 210.0})
     with pytest.raises(UnreachableError):
