@@ -12,6 +12,7 @@ import numpy as np
 
 from rrru.arrays import BoolArray, FloatArray
 from rrru.kinematics.base_parameters import (
+    LEFT_OF_DATA,
     Candidate,
     MeasurementConfig,
     candidate_components,
@@ -25,8 +26,6 @@ from rrru.kinematics.readings import Readings
 from rrru.kinematics.robot import Robot
 from rrru.parameters import Parameter, ParameterSet
 
-# share of a parameter's column that must be independent of the other columns
-_LEFT_OF_DATA = 1e-2
 _ANGLE_LIMIT_RAD, _LENGTH_LIMIT_MM = 0.3, 100.0
 
 
@@ -77,7 +76,7 @@ class AugmentedRobot(Robot):
         columns = columns.reshape(-1, columns.shape[2])
         basis, _ = np.linalg.qr(columns[:, :count])
         scale = column_scale(self._added, self.characteristic_length_mm)
-        chosen, _ = choose(columns[:, count:] * scale, [True] * len(scale), _LEFT_OF_DATA, basis)
+        chosen, _ = choose(columns[:, count:] * scale, [True] * len(scale), LEFT_OF_DATA, basis)
         return replace(self, added=tuple(self._added[k] for k in chosen))
 
     def with_measurement_config(self, config: MeasurementConfig) -> Robot:

@@ -19,6 +19,7 @@ from rrru.arrays import BoolArray, FloatArray
 from rrru.errors import ConfigError
 from rrru.kinematics import base_parameters
 from rrru.kinematics.base_parameters import (
+    LEFT_OF_DATA,
     Candidate,
     MeasurementConfig,
     candidate_components,
@@ -39,8 +40,8 @@ from rrru.kinematics.robot import Robot
 from rrru.parameters import ParameterSet
 
 SETS = ("frame", "zero", "full")
-# poses over which parameters have to be separable, their tilt, and the independent share of a column that is needed
-_POSES, _TILT_RAD, _LEFT, _LEFT_OF_DATA = 60, 0.15, 1e-6, 1e-2
+# poses over which parameters are separable without a campaign, their tilt, and the independent share of a column needed
+_POSES, _TILT_RAD, _LEFT = 60, 0.15, 1e-6
 _SEEN = 1e-6  # share of the largest singular value that others need to count
 
 
@@ -93,7 +94,7 @@ class GeneralRobot(Robot):
         if self.parameter_set != "full" and not self.sample:
             return wanted, {}
         actuators, position, readings = self.sample or (*self._workspace(), None)
-        least = _LEFT_OF_DATA if self.sample else _LEFT
+        least = LEFT_OF_DATA if self.sample else _LEFT
         at = self.map_of_closed(actuators, position, readings)
         candidates = self.candidates
         columns = at.columns(np.stack([direction(self.legs, candidate) for candidate in candidates], axis=-1))
