@@ -180,7 +180,9 @@ class CalibrationResult:
         return float(next(fit.rms_mm for (_, method), fit in self.fits.items() if method == "least_squares"))
 
     def __repr__(self) -> str:
-        return f"CalibrationResult({self.campaign.name!r}, rms {self.rms_mm:.3g} mm)"
+        held = int(next(iter(self.fits.values())).at_bound.sum())
+        bounds = f", {held} parameter{'s' if held > 1 else ''} at a bound: widen calibration.bounds" if held else ""
+        return f"CalibrationResult({self.campaign.name!r}, rms {self.rms_mm:.3g} mm{bounds})"
 
     def _repr_html_(self) -> str:
         return self.parameters.to_html(index=False)

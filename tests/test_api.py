@@ -4,6 +4,7 @@ import doctest
 import inspect
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -116,6 +117,14 @@ def test_what_is_no_result_of_the_library_is_refused_in_words():
     ):
         with pytest.raises(rrru.ConfigError, match=said):
             call()
+
+
+def test_a_calibration_at_its_bounds_says_so():
+    campaign = rrru.read_campaign(FIELD, rrru.load_robot("rrru3"), noise_mm=0.02)
+    assert "bound" not in repr(rrru.calibrate(campaign))
+    narrow = {**campaign.config["calibration"], "bounds": {"angle_rad": 0.025, "length_mm": 0.01}}
+    held = rrru.calibrate(replace(campaign, config={**campaign.config, "calibration": narrow}))
+    assert "parameters at a bound: widen calibration.bounds" in repr(held)
 
 
 def test_one_stated_reflector_needs_no_column(arm):
