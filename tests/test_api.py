@@ -181,12 +181,17 @@ def test_a_zero_that_is_off_is_found_and_the_corrected_file_holds_it(arm, tmp_pa
     assert np.sqrt((left**2).sum(axis=1).mean()) < NOISE_MM
 
 
+@pytest.fixture(scope="module")
+def diagnosis(arm):
+    campaign = rrru.read_campaign(_measured(arm, np.random.default_rng(5)), arm, noise_mm=NOISE_MM, name="arm")
+    return rrru.diagnose(campaign, effects=["drive_compliance"])
+
+
+@pytest.mark.usefixtures("quick_figures")
 @pytest.mark.parametrize("largest", [None, 100])
-def test_what_a_result_writes_is_what_it_holds(arm, tmp_path, monkeypatch, largest):
+def test_what_a_result_writes_is_what_it_holds(diagnosis, tmp_path, monkeypatch, largest):
     if largest:
         monkeypatch.setattr(files, "LARGEST_SVG", largest)
-    campaign = rrru.read_campaign(_measured(arm, np.random.default_rng(5)), arm, noise_mm=NOISE_MM, name="arm")
-    diagnosis = rrru.diagnose(campaign, effects=["drive_compliance"])
     page = diagnosis.write(tmp_path)
     # a page shows a figure that is too large for it as PNG, whatever was asked for
     drawn = [*(tmp_path / "figures/arm").glob("*.svg")]
