@@ -1,6 +1,6 @@
 """Diagnosis of one campaign's gap between calibrated model and measurements, with its figures."""
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from typing import Any
 
 import pandas as pd
@@ -83,16 +83,17 @@ def write(
     nominal: Robot,
     paths: Mapping[str, str],
     kinds: Collection[str] = KINDS,
+    call: Callable[..., Iterable[Any]] = map,
 ) -> None:
     """Write verdict, tables and figures of a Diagnosis to paths by name.
 
-    nominal: the robot as measured; kinds: of the figures' files, see `draw_all`.
+    nominal: the robot as measured; kinds: of the figures' files, and call: as `map`, see `draw_all`.
     """
     json_files.write(facts(settings, result, nominal), paths["verdict"])
     frames = frames_of(settings, result)
     tables.write_all(tables_of(nominal), frames, paths)
     options = figure_options(settings, nominal)
-    draw_all(settings["figures"], {name: paths[name] for name in frames}, options, paths, kinds)
+    draw_all(settings["figures"], {name: paths[name] for name in frames}, options, paths, kinds, call)
 
 
 def figure_options(settings: Mapping[str, Any], nominal: Robot) -> dict[str, Any]:
