@@ -40,7 +40,6 @@ from rrru.pipeline.progress import Progress, shown
 from rrru.pipeline.read_config import check_config, merged, read_config
 from rrru.pipeline.result_paths import result_paths
 from rrru.pipeline.workers import Workers
-from rrru.report import page
 from rrru.store import json_files
 from rrru.store.atomic_write import whole, write_text
 
@@ -298,16 +297,21 @@ class DiagnosisResult:
         kinds = with_svg(figures)
         name, config = self.campaign.name, self.campaign.config
         paths = result_paths(folder, name, config)
+        # large imports: of the first a command with workers has no need, the second comes while these draw
         if workers is None:
-            # large imports that a command with workers does not need
             from rrru.pipeline.jobs import campaign_results
 
             campaign_results.write(config, name, self.campaign.frames, folder, kinds)
         else:
             workers.finish(paths)
         done = self._corrected(paths["corrected"]) if "corrected" in paths else self
-        call = map if workers is None else workers.call
-        diagnose_job.write(self._settings, done.result, self._robot, paths, kinds, call)
+        call = workers.call if workers else map
+        drawing = diagnose_job.begin(self._settings, done.result, self._robot, paths, kinds, call)
+        from rrru.report import page
+
+        page.prepare()
+        for _ in drawing:
+            pass
         target = Path(folder, "campaigns", name, "report.html")
         page.write(str(folder), str(target), "", name)
         return target

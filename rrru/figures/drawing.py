@@ -8,7 +8,7 @@ import inspect
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from rrru.figures.choose import Options, Tables
 from rrru.figures.files import KINDS, fits_page
@@ -26,18 +26,31 @@ def draw_all(
     options: Options,
     outputs: Mapping[str, str],
     kinds: Collection[str] = KINDS,
-    call: Callable[..., Iterable[Any]] = map,
 ) -> None:
     """Draw figures {name: ("module:function", names of its tables)} to outputs["{name}_{kind}"] of `KINDS`.
 
     paths: the tables' paths by name; options: of all figures, see their functions; kinds: of the files, "svg" among
     them. A figure whose SVG is too large for a page has a PNG whatever the kinds; files of other kinds that an earlier
-    run left are removed. The docstring of a figure's function is its caption in all files. call: calls a function for
-    each figure, as `map` does, or in other processes.
+    run left are removed. The docstring of a figure's function is its caption in all files.
+    """
+    for _ in drawn(figures, paths, options, outputs, kinds):
+        pass
+
+
+def drawn(
+    figures: Mapping[str, tuple[str, Sequence[str]]],
+    paths: Mapping[str, str],
+    options: Options,
+    outputs: Mapping[str, str],
+    kinds: Collection[str] = KINDS,
+    call: Callable[..., Iterable[None]] = map,
+) -> Iterable[None]:
+    """`draw_all` figure by figure as the result is iterated.
+
+    call: as `map`; one that calls in other processes begins at once with all figures.
     """
     draw_one = partial(_draw_files, paths=dict(paths), options=options, outputs=dict(outputs), kinds=kinds)
-    for _ in call(draw_one, figures, figures.values()):
-        pass
+    return call(draw_one, figures, figures.values())
 
 
 def _draw_files(

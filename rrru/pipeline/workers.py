@@ -87,8 +87,10 @@ class Workers:
                 Path(paths[name]).unlink(missing_ok=True)
 
     def call(self, function: Callable[..., _Answer], *inputs: Iterable[Any]) -> Iterable[_Answer]:
-        """As `map`, in the processes."""
-        return self._pool.map(function, *inputs)
+        """As `map`, in the processes, which end then."""
+        answers = self._pool.map(function, *inputs)
+        self._pool.shutdown(wait=False)
+        return answers
 
     def _start_second(self, _written: Future[dict[str, str]]) -> None:
         """Start the second process, which loads Matplotlib."""
