@@ -50,7 +50,7 @@ def workers(cores: int) -> Iterator["Workers | None"]:
         try:
             yield Workers(pool, folder)
         except BaseException:
-            # nobody waits for what they do
+            # what they do is not needed
             for process in active_children():
                 process.terminate()
             raise
@@ -87,10 +87,8 @@ class Workers:
                 Path(paths[name]).unlink(missing_ok=True)
 
     def call(self, function: Callable[..., _Answer], *inputs: Iterable[Any]) -> Iterable[_Answer]:
-        """As `map`, in the processes, which end then."""
-        answers = self._pool.map(function, *inputs)
-        self._pool.shutdown(wait=False)
-        return answers
+        """As `map`, in the processes, which begin at once."""
+        return self._pool.map(function, *inputs)
 
     def _start_second(self, _written: Future[dict[str, str]]) -> None:
         """Start the second process, which loads Matplotlib."""
