@@ -94,10 +94,13 @@ def test_one_core_has_no_workers():
 
 @pytest.mark.skipif(os.name != "posix", reason="signals and ps are those of POSIX")
 def test_ctrl_c_leaves_no_process(tmp_path):
-    command = [sys.executable, "-m", "rrru", *_command(tmp_path / "out", 2)]
+    code = "import sys, time; from rrru import api, cli\n"
+    # a diagnosis without an end, while a worker calibrates
+    code += "api.diagnose = lambda *_, **__: (print('diagnosed', flush=True), time.sleep(300.0))\n"
+    command = [sys.executable, "-c", code + "sys.exit(cli.main())", *_command(tmp_path / "out", 2)]
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
     started = subprocess.Popen(command, **pipes, text=True, start_new_session=True)
-    time.sleep(2.0)
+    assert started.stdout.readline() == "diagnosed\n"
     os.killpg(started.pid, signal.SIGINT)
     _, message = started.communicate(timeout=60.0)
     assert (started.returncode, message) == (cli.INTERRUPTED, "interrupted\n")
