@@ -4,4 +4,6 @@ import sys
 
 from rrru.cli import main
 
-sys.exit(main())
+# other processes of the command load this module, too
+if __name__ == "__main__":
+    sys.exit(main())
