@@ -5,8 +5,9 @@ phase per leg, whole number of periods per turn), non-repeatability, the line gr
 No number of the paper enters the simulation. All candidates have the same draws of non-repeatability and noise (common
 random numbers), so that the objective is smooth; see `twin_objective`. For speed the search solves eq. (8), compiled,
 with clearance to first order. For ideal axes this agrees with the spatial closure to hundredths of a millimetre, near
-the lines' singular start, and to micrometres elsewhere. It calibrates on a linearised model, which is accurate to
-hundredths of a millimetre where it was calibrated. The result is then run and calibrated like every other campaign.
+the lines' singular start, and to micrometres elsewhere. It calibrates on a model that is linearised where the
+calibration ends: to thousandths of a millimetre where it was calibrated, and some tenths on the spiral after a
+calibration on one line. The result is then run and calibrated like every other campaign.
 Lengths in mm, angles in rad.
 """
 
