@@ -19,32 +19,39 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
+from rrru.calibration.calibrate import Calibration
 from rrru.diagnosis.diagnose import STEPS
 from rrru.diagnosis.diagnose import Diagnosis as CoreDiagnosis
 from rrru.diagnosis.verdict_facts import NOT_CORRECTED
 from rrru.errors import ConfigError, IngestError, RrruError, not_a_file
-from rrru.figures.drawing import draw
-from rrru.figures.files import with_svg
+from rrru.figures.drawing import draw, draw_all
+from rrru.figures.files import figure_paths, with_svg
 from rrru.kinematics.robot import Robot
 from rrru.pipeline import config as parts
 from rrru.pipeline import setup
+from rrru.pipeline.jobs import calibrate as calibrate_job
+from rrru.pipeline.jobs import compensate as compensate_job
 from rrru.pipeline.jobs import diagnose as diagnose_job
+from rrru.pipeline.jobs import genetic as genetic_job
 from rrru.pipeline.jobs import read as read_job
-from rrru.pipeline.jobs.outputs import GAP_FIGURES
+from rrru.pipeline.jobs.outputs import (
+    CAMPAIGN_FIGURES,
+    CAMPAIGN_TABLES,
+    GAP_FIGURES,
+    GAP_TABLES,
+    READ_TABLES,
+    part_path,
+)
 from rrru.pipeline.progress import Progress, shown
 from rrru.pipeline.read_config import check_config, merged, read_config
-from rrru.pipeline.result_paths import result_paths
-from rrru.pipeline.workers import Workers
+from rrru.report import page
 from rrru.store import json_files
 from rrru.store.atomic_write import whole, write_text
-
-if TYPE_CHECKING:
-    from rrru.calibration.calibrate import Calibration
 
 
 @dataclass(frozen=True)
@@ -145,7 +152,7 @@ class CalibrationResult:
     campaign: Campaign
     settings: Mapping[str, Any] = field(repr=False)
     frames: Mapping[str, pd.DataFrame] = field(repr=False)
-    fits: "Mapping[tuple[str, str], Calibration]" = field(repr=False)
+    fits: Mapping[tuple[str, str], Calibration] = field(repr=False)
 
     @property
     def parameters(self) -> pd.DataFrame:
@@ -292,28 +299,20 @@ class DiagnosisResult:
         SVG is a PNG there. Returns the path of the page. A page of the workflow for the same campaign and configuration
         has the same bytes. Raises ConfigError for another kind.
         """
-        return self.write_with(folder, figures, None)
-
-    def write_with(self, folder: str | Path, figures: Sequence[str], workers: Workers | None) -> Path:
-        """`write` with what workers have made of the campaign, in whose processes figures are drawn then."""
         kinds = with_svg(figures)
-        name, config = self.campaign.name, self.campaign.config
-        paths = result_paths(folder, name, config)
-        # large imports: of the first a command with workers has no need, the second comes while these draw
-        if workers is None:
-            from rrru.pipeline.jobs import campaign_results
-
-            campaign_results.write(config, name, self.campaign.frames, folder, kinds)
-        else:
-            workers.finish(paths)
+        name, config, folder = self.campaign.name, self.campaign.config, Path(folder)
+        paths = _paths(folder, name, config)
+        read_job.write(self._read_settings, self.campaign.frames, paths)
+        calibration = calibrate(self.campaign)
+        calibrate_job.write(calibration.settings, calibration.frames, self.campaign.frames["campaigns"], paths)
+        frames = {**self.campaign.frames, **calibration.frames}
+        genetic = genetic_job.genetic(parts.calibration_settings(config, name, *parts.GENETIC_KEYS), frames)
+        genetic_job.write(genetic, paths)
+        settings = parts.calibration_settings(config, name, driven=True)
+        compensate_job.write(compensate_job.compensate(settings, frames | genetic), paths)
         done = self._corrected(paths["corrected"]) if "corrected" in paths else self
-        call = workers.call if workers else map
-        drawing = diagnose_job.begin(self._settings, done.result, self._robot, paths, kinds, call)
-        from rrru.report import page
-
-        page.prepare()
-        for _ in drawing:
-            pass
+        diagnose_job.write(self._settings, done.result, self._robot, paths, kinds)
+        draw_all(CAMPAIGN_FIGURES, paths, parts.figure_options(config, name), paths, kinds)
         target = Path(folder, "campaigns", name, "report.html")
         page.write(str(folder), str(target), "", name)
         return target
@@ -341,6 +340,10 @@ class DiagnosisResult:
     @property
     def _figure_options(self) -> dict[str, Any]:
         return diagnose_job.figure_options(self._settings, self._robot)
+
+    @cached_property
+    def _read_settings(self) -> dict[str, Any]:
+        return parts.read_settings(self.campaign.config, self.campaign.name)
 
     @cached_property
     def _robot(self) -> Robot:
@@ -487,8 +490,6 @@ def calibrate(campaign: Campaign) -> CalibrationResult:
     >>> round(calibrate(campaign).rms_mm, 3)
     0.083
     """
-    from rrru.pipeline.jobs import calibrate as calibrate_job
-
     _require(campaign, Campaign, "rrru.read_campaign")
     settings = parts.calibration_settings(campaign.config, campaign.name, *parts.CALIBRATION_KEYS)
     frames, fits = calibrate_job.calibrate(settings, campaign.measurements, campaign.frames["campaigns"])
@@ -591,6 +592,20 @@ def _require(value: Any, kind: type, made_by: str) -> None:
     """Raise ConfigError where an argument is not what another function has made."""
     if not isinstance(value, kind):
         raise ConfigError(f"got a {type(value).__name__} in place of a {kind.__name__}; allowed: a result of {made_by}")
+
+
+def _paths(folder: Path, name: str, config: Mapping[str, Any]) -> dict[str, str]:
+    """Paths of all files of a campaign in a folder of results, as the workflow has them."""
+    named = (*READ_TABLES, *CAMPAIGN_TABLES, *GAP_TABLES, "gap_points", "corrected_drives")
+    kind = parts.corrected_kind(config, config["campaigns"][name])
+    return {
+        **{table: part_path(folder, name, table) for table in named},
+        **figure_paths(f"{folder}/figures/{name}", {**CAMPAIGN_FIGURES, **GAP_FIGURES}),
+        "timings": f"{folder}/timings/{name}.parquet",
+        "verdict": f"{folder}/campaigns/{name}/verdict.json",
+        "robot": f"{folder}/campaigns/{name}/robot.json",
+        **({"corrected": f"{folder}/campaigns/{name}/corrected.{kind}"} if kind else {}),
+    }
 
 
 def as_name(text: str) -> str:

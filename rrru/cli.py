@@ -21,7 +21,6 @@ import yaml
 from rrru import __version__
 from rrru.errors import ConfigError, FitError, IngestError, RrruError, SimulationError, UnreachableError, not_a_file
 from rrru.pipeline.option_text import options_in
-from rrru.pipeline.workers import Workers, usable_cores, workers
 
 DONE, REFUSED, WRONG, FAILED = range(4)
 INTERRUPTED = 130
@@ -44,18 +43,18 @@ class _Parser(argparse.ArgumentParser):
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; returns its exit code. arguments: None for those of the process, which then ends with it."""
     if arguments is not None:
-        return _run(arguments, 1)
+        return _run(arguments)
     # searches for garbage, one of them as the process ends, cost 0.3 s and free little
     gc.disable()
     try:
-        return _run(sys.argv[1:], usable_cores())
+        return _run(sys.argv[1:])
     finally:
         gc.freeze()
 
 
-def _run(arguments: Sequence[str], cores: int) -> int:
-    """Run the command with arguments; returns its exit code. cores: that it may use where no option says it."""
-    options = _parser(cores).parse_args(arguments)
+def _run(arguments: Sequence[str]) -> int:
+    """Run the command with arguments; returns its exit code."""
+    options = _parser().parse_args(arguments)
     # libraries that compute with several threads give other last digits, and are slower on matrices of this size
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(name, "1")
@@ -81,8 +80,8 @@ def _run(arguments: Sequence[str], cores: int) -> int:
         return FAILED if not known else REFUSED if isinstance(error, _OF_DATA) else WRONG
 
 
-def _parser(cores: int) -> argparse.ArgumentParser:
-    """The command line; cores: to be used by default."""
+def _parser() -> argparse.ArgumentParser:
+    """The command line."""
     parser = _Parser(
         prog="rrru",
         description="Why does a calibrated robot still miss? Calibration and diagnosis from a file of measurements.",
@@ -98,7 +97,6 @@ def _parser(cores: int) -> argparse.ArgumentParser:
     about = "files of the figures besides SVG: pdf, png"
     one.add_argument("--figures", type=_names, default=(), metavar="KIND,..", help=about)
     one.add_argument("--json", action="store_true", help="print the answer as JSON")
-    one.add_argument("--cores", type=int, default=cores, metavar="N", help="1: one process; default: %(default)s")
     about = "what is in a file: its columns, what is missing, what a run would refuse, and a section to paste"
     _command(commands, "check", _check, about, _campaign)
     one = _command(commands, "compare", _compare, "which of two calibrations to trust, as a page")
@@ -263,12 +261,6 @@ def _names(text: str) -> list[str]:
 
 def _diagnose(options: argparse.Namespace) -> int:
     """Read, calibrate and diagnose a campaign; write its results and print the answer."""
-    with workers(options.cores) as working:
-        return _diagnose_with(working, options)
-
-
-def _diagnose_with(working: Workers | None, options: argparse.Namespace) -> int:
-    """`_diagnose` with other processes, or None."""
     from rrru import api
     from rrru.figures.files import with_svg
 
@@ -281,11 +273,9 @@ def _diagnose_with(working: Workers | None, options: argparse.Namespace) -> int:
     terminal = sys.stderr.isatty()
     with _during("file", terminal):
         campaign = api.configured_campaign(name, config)
-    if working:
-        working.begin(config, name, campaign.frames, kinds)
     diagnosis = api.diagnose(campaign, effects=options.effects, progress=terminal)
     with _during("page, tables and figures", terminal):
-        page = diagnosis.write_with(options.out, kinds, working)
+        page = diagnosis.write(options.out, kinds)
     if options.json:
         print(page.with_name("verdict.json").read_text(encoding="utf-8"), end="")
     else:

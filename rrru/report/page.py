@@ -4,7 +4,7 @@ import base64
 import html
 import os
 from dataclasses import dataclass, field
-from functools import cache, cached_property
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -163,24 +163,13 @@ def write(folder: str | Path, path: str | Path, reproduced: str, campaign: str |
     write_text(render("report.html", **values), path)
 
 
-def prepare() -> None:
-    """Load the templates of the page, which takes as long as to fill them; `write` does it otherwise."""
-    for name in ("base.html", "parts.html", "words.html", "report.html"):
-        environment().get_template(name)
-
-
 def render(template: str, **values: Any) -> str:
     """A page of a template of this folder."""
-    return environment().get_template(template).render(**values)
-
-
-@cache
-def environment() -> jinja2.Environment:
-    """The templates of this folder."""
     loader = jinja2.FileSystemLoader(TEMPLATES)
-    return jinja2.Environment(
+    environment = jinja2.Environment(
         loader=loader, autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
+    return environment.get_template(template).render(**values)
 
 
 def _part(results: Results, section: contents.Section) -> Part | None:

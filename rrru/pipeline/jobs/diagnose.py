@@ -1,6 +1,6 @@
 """Diagnosis of one campaign's gap between calibrated model and measurements, with its figures."""
 
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from typing import Any
 
 import pandas as pd
@@ -11,7 +11,7 @@ from rrru.diagnosis.design.run_limits import StatedLimits
 from rrru.diagnosis.schemas import TABLES, tables_of
 from rrru.diagnosis.settings import GapSettings
 from rrru.diagnosis.verdict_facts import answer
-from rrru.figures.drawing import drawn
+from rrru.figures.drawing import draw_all
 from rrru.figures.files import KINDS
 from rrru.kinematics.dynamics import Masses
 from rrru.kinematics.robot import Robot
@@ -26,8 +26,7 @@ def main(settings: Mapping[str, Any], inputs: Mapping[str, str], outputs: Mappin
     result = diagnose(settings, measurements)
     if "corrected" in outputs:
         result = with_corrected(settings, result, outputs["corrected"])
-    for _ in begin(settings, result, setup.measured_robot(settings["robot"], measurements), outputs):
-        pass
+    write(settings, result, setup.measured_robot(settings["robot"], measurements), outputs)
 
 
 def diagnose(
@@ -78,26 +77,22 @@ def frames_of(settings: Mapping[str, Any], result: core.Diagnosis) -> dict[str, 
     }
 
 
-def begin(
+def write(
     settings: Mapping[str, Any],
     result: core.Diagnosis,
     nominal: Robot,
     paths: Mapping[str, str],
     kinds: Collection[str] = KINDS,
-    call: Callable[..., Iterable[None]] = map,
-) -> Iterable[None]:
-    """Write verdict and tables of a Diagnosis to paths by name; the figures are drawn once the result is iterated.
+) -> None:
+    """Write verdict, tables and figures of a Diagnosis to paths by name.
 
-    nominal: the robot as measured; kinds, call: see `rrru.figures.drawing.drawn`.
+    nominal: the robot as measured; kinds: of the figures' files, see `draw_all`.
     """
-    frames, known = frames_of(settings, result), tables_of(nominal)
-    of_figures = {name: frames[name] for _, needed in settings["figures"].values() for name in needed}
-    tables.write_all(known, of_figures, paths)
-    drawing = drawn(settings["figures"], paths, figure_options(settings, nominal), paths, kinds, call)
-    # other processes draw meanwhile
-    tables.write_all(known, {name: frame for name, frame in frames.items() if name not in of_figures}, paths)
     json_files.write(facts(settings, result, nominal), paths["verdict"])
-    return drawing
+    frames = frames_of(settings, result)
+    tables.write_all(tables_of(nominal), frames, paths)
+    options = figure_options(settings, nominal)
+    draw_all(settings["figures"], {name: paths[name] for name in frames}, options, paths, kinds)
 
 
 def figure_options(settings: Mapping[str, Any], nominal: Robot) -> dict[str, Any]:
