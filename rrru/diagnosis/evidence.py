@@ -95,6 +95,8 @@ class ModelEvidence:
 
     def on_complete(self, terms: Sequence[EffectTerm]) -> "ModelEvidence":
         """The evidence on the readings at which all effects of terms have what they need."""
+        if not self.known:
+            return self
         return self._on({term.effect for term in terms} & self.known.keys())
 
     def _on(self, names: Collection[str]) -> "ModelEvidence":
@@ -291,10 +293,8 @@ class ModelEvidence:
 
     def _broadest(self, terms: Sequence[EffectTerm]) -> int | None:
         """Number of the term of the most coefficients if these are many, None where no term has."""
-        counts = [len(self._prior(term).columns) for term in terms]
-        broad = [self.library[term.effect].coordinates.broad for term in terms]
-        wide = [count if many else 0 for count, many in zip(counts, broad, strict=True)]
-        return int(np.argmax(wide)) if any(wide) else None
+        broad = [k for k, term in enumerate(terms) if self.library[term.effect].coordinates.broad]
+        return max(broad, key=lambda k: len(self._prior(terms[k]).columns), default=None)
 
     def _with_broad_term(
         self,

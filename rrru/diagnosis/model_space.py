@@ -24,13 +24,15 @@ neighbours, and is completed once its answer has come back.
 """
 
 from collections.abc import Collection, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from scipy.linalg import solve_triangular
 
 from rrru.arrays import BoolArray, FloatArray, IntArray
+from rrru.cache import read_only
 from rrru.diagnosis.discrepancy_basis import UNKNOWN
 from rrru.diagnosis.evidence import PRIOR_SCALES, ModelEvidence, averaged
 from rrru.diagnosis.evidence_kernels import log_evidence_of_blocks, log_sum_exp
@@ -81,6 +83,8 @@ class ModelSpace:
         # those whose best level has been looked for
         self._climbed: set[frozenset[EffectTerm]] = set()
         self._highest = -np.inf
+        # searches from different starts expand the same sets
+        self._gained: dict[tuple[Any, ...], tuple[FloatArray, FloatArray]] = {}
         for terms in ((), *((term,) for term in self._terms)):
             self._single(terms)
 
@@ -170,11 +174,14 @@ class ModelSpace:
         self, terms: Sequence[EffectTerm], prior_scales: Sequence[float] | FloatArray, level: int
     ) -> tuple[FloatArray, FloatArray]:
         """Log evidence (c,) that each candidate adds to a set, averaged over its prior scale, and the best scale."""
-        gains = self._candidates.gains(terms, prior_scales, level)
-        total = np.full(len(gains), -np.inf)
-        may_act = gains[:, 0] > -np.inf
-        total[may_act] = averaged(gains[may_act], 1)
-        return total, PRIOR_SCALES[gains.argmax(axis=1)]
+        asked = *terms, *prior_scales, level
+        if asked not in self._gained:
+            gains = self._candidates.gains(terms, prior_scales, level)
+            total = np.full(len(gains), -np.inf)
+            may_act = gains[:, 0] > -np.inf
+            total[may_act] = averaged(gains[may_act], 1)
+            self._gained[asked] = read_only((total, PRIOR_SCALES[gains.argmax(axis=1)]))
+        return self._gained[asked]
 
     def _expand(self, key: frozenset[EffectTerm], found: _Search) -> None:
         """Evaluate those of a set's neighbours that may matter."""
@@ -244,7 +251,7 @@ class ModelSpace:
 
     def _is_known(self, term: EffectTerm) -> bool:
         """Whether a term, on whichever legs, is of this space."""
-        return replace(term, legs=EACH) in self._terms
+        return term._replace(legs=EACH) in self._terms
 
     def _evaluate(
         self, terms: Sequence[EffectTerm], level: int | None, prior_scales: FloatArray | None, climb: bool = False

@@ -167,9 +167,9 @@ def _over_cases(problem: MarginalProblem, scale: FloatArray) -> FloatArray:
 def _in_cases(problem: MarginalProblem, scale: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Logarithms (c,) of the probabilities of all cases, and prior deviations (m c, k) of rows (m, k) in each."""
     log, shares = _cases(problem.weights)
-    scales = np.repeat(scale, len(log), axis=0)
-    scales[:, -shares.shape[1] :] *= np.tile(shares, (len(scale), 1))
-    return log, scales
+    scales = np.repeat(scale[:, None], len(log), axis=1)
+    scales[..., -shares.shape[1] :] *= shares
+    return log, scales.reshape(-1, scale.shape[1])
 
 
 def cases_of(names: Iterable[str]) -> tuple[FloatArray, FloatArray]:

@@ -172,6 +172,7 @@ class Weigher:
         self._evidence, self._levels = evidence, discrepancy_scales(evidence.noise)
         self._prior = prior
         self._effects: dict[str, FloatArray] = {}
+        self._of_terms: dict[EffectTerm, tuple[float, float]] = {}
         # by effect the probabilities that it acts on some legs, and that it acts on each, on all alike, or on one
         self._kinds: dict[str, tuple[float, float]] = {}
         self._legs = {name: len(np.unique(effect.coordinates.legs)) for name, effect in library.items()}
@@ -200,8 +201,12 @@ class Weigher:
         total = self._sets[len(known)]
         total += (len(terms) - len(known)) * np.log(self._prior.unexplained / max(self._functions, 1))
         for term in known:
-            total += self._effects[term.effect][term.shape]
-            total += np.log(self._of_legs(term))
+            if term not in self._of_terms:
+                of_shape = float(self._effects[term.effect][term.shape])
+                self._of_terms[term] = of_shape, float(np.log(self._of_legs(term)))
+            of_shape, of_legs = self._of_terms[term]
+            total += of_shape
+            total += of_legs
         return float(total)
 
     def _of_legs(self, term: EffectTerm) -> float:

@@ -1,7 +1,6 @@
 """The tables behind a verdict."""
 
 from collections.abc import Collection, Iterator, Sequence
-from dataclasses import replace
 from itertools import zip_longest
 
 import numpy as np
@@ -111,7 +110,7 @@ def where(inference: InferenceResult, effects: Collection[str], numbers: pd.Data
             places = acting_places(numbers[numbers["effect"] == term.effect].to_dict("records"))
             legs = np.unique(problem.library[term.effect].coordinates.legs).tolist()
             acting = sites(problem.library, problem.motion, term, [leg for leg in legs if words.place(leg) in places])
-        every = sites(problem.library, problem.motion, replace(term, legs=EACH))
+        every = sites(problem.library, problem.motion, term._replace(legs=EACH))
         chosen = [site for site in acting or own if site not in listed]
         listed |= {*chosen}
         found += _ranges([drives.get(site, site) for site in every], [drives.get(site, site) for site in chosen])

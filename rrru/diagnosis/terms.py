@@ -1,7 +1,7 @@
 """Terms of hypotheses: one effect with fixed shape parameters, on all legs, with one value for all, or on some legs."""
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,9 +17,8 @@ EACH, SAME = "each", "same"
 OnLegs = str | int | tuple[int, ...]
 
 
-@dataclass(frozen=True)
-class EffectTerm:
-    """One effect of a hypothesis.
+class EffectTerm(NamedTuple):
+    """One effect of a hypothesis, a tuple since sets of terms are looked up a hundred thousand times.
 
     effect: its name; shape: number of the values of its nonlinear parameters in `Coordinates.shapes`, such as a gear
     ratio; legs: EACH, SAME, the number of the one leg that it acts on, or those of some of them.
@@ -51,7 +50,7 @@ def shape_probabilities(coordinates: Coordinates) -> FloatArray:
 
 def each_leg(term: EffectTerm) -> EffectTerm:
     """The term with a value of its own for each leg where it has one value for all of them."""
-    return replace(term, legs=EACH) if term.legs == SAME else term
+    return term._replace(legs=EACH) if term.legs == SAME else term
 
 
 def per_leg(effect: TestedEffect) -> bool:
@@ -99,7 +98,7 @@ def on_neighbouring_legs(effect: TestedEffect, term: EffectTerm) -> tuple[Effect
     every = np.unique(effect.coordinates.legs).tolist()
     present = every if term.legs == EACH else np.atleast_1d(np.array(term.legs)).tolist()
     changed = [sorted({*present} ^ {leg}) for leg in every]
-    return tuple(replace(term, legs=_as_legs(legs, len(every))) for legs in changed if legs)
+    return tuple(term._replace(legs=_as_legs(legs, len(every))) for legs in changed if legs)
 
 
 def _as_legs(legs: list[int], count: int) -> OnLegs:

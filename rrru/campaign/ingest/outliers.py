@@ -233,9 +233,9 @@ def _inner_blocks(place: np.ndarray, deviation: np.ndarray, noise_mm: float) -> 
 
 def _off_median(deviation: np.ndarray) -> np.ndarray:
     """Distances (n,) of deviations (n, 3) of one run from their running median."""
-    from scipy.ndimage import median_filter
-
-    return np.asarray(np.linalg.norm(deviation - median_filter(deviation, size=(_WINDOW, 1), mode="nearest"), axis=1))
+    padded = np.pad(deviation, ((_LONGEST, _LONGEST), (0, 0)), mode="edge")
+    median = np.median(np.lib.stride_tricks.sliding_window_view(padded, _WINDOW, axis=0), axis=-1)
+    return np.asarray(np.linalg.norm(deviation - median, axis=1))
 
 
 def _off_curve(place: np.ndarray, deviation: np.ndarray, blocks: np.ndarray, nodes: np.ndarray) -> np.ndarray:
