@@ -26,6 +26,8 @@ from rrru.effects.protocol import Effect
 from rrru.estimation.intervals import QUANTILE_95
 from rrru.robots.drive_words import LENGTH, DriveWords, drive_words
 
+# of a difference of two numbers, as a share of these
+_ROUNDING = 1e-12
 # the table has columns for so many drives of either unit, whatever the robot
 _LEAST_DRIVES = 3
 _EMPTY = {"legs": "", "log_evidence": np.nan}
@@ -298,9 +300,18 @@ def _effect_values(fit: ModelFit, library: Library, term: EffectTerm) -> tuple[F
         (followed,) = np.nonzero(slopes)
         if len(followed) == 1:
             number = followed[0]
-            ends[row] = np.sort(values[row] + slopes[number] * (intervals[number] - numbers[number]))
+            ends[row] = followed_interval(values[row], slopes[number], numbers[number], intervals[number])
     ends[~slope.any(axis=1)] = np.nan
     return values, errors, ends
+
+
+def followed_interval(value: float, slope: float, number: float, interval: FloatArray) -> FloatArray:
+    """Interval (2,) of a value that follows a number with an interval (2,) at a slope.
+
+    An end at zero, such as a bound, is zero and not its rounding.
+    """
+    ends = np.sort(value + slope * (interval - number))
+    return np.where(np.abs(ends) < _ROUNDING * abs(value), 0.0, ends)
 
 
 def _point_rows(inference: InferenceResult, after: FloatArray, drive: FloatArray) -> pd.DataFrame:

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 
 from rrru.diagnosis.diagnose import MeasuredRobot, diagnose
-from rrru.diagnosis.result_tables import acting_places, places_of, where
+from rrru.diagnosis.result_tables import acting_places, followed_interval, places_of, where
 from rrru.diagnosis.settings import GapSettings
 from rrru.diagnosis.terms import EffectTerm
 from rrru.effects.library import find, library
@@ -16,6 +16,14 @@ from rrru.robots.catalogue import make_mechanism
 from rrru.robots.drive_words import drive_words
 from rrru.robots.hexapod import hexapod
 from tests.diagnosis.campaigns import MASSES, NOISE_MM, ROBOT, active, measure
+
+
+def test_an_end_at_a_bound_of_zero_is_zero():
+    """Of a width that follows a coefficient with a factor: rounding made -3.9e-19 of it, which looks like a sign."""
+    generator = np.random.default_rng(1)
+    for number, slope in zip(generator.uniform(0.0, 1e-3, 200), generator.uniform(-2.0, 2.0, 200), strict=True):
+        ends = followed_interval(slope * number, slope, number, np.array([0.0, 2.1 * number]))
+        assert 0.0 in ends and np.isclose(np.abs(ends).max(), 2.1 * abs(slope * number))
 
 
 def test_a_parameter_is_placed_at_the_leg_that_its_name_counts_and_a_shared_one_nowhere():
