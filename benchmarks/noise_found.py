@@ -23,7 +23,7 @@ from benchmarks.harness import RESULTS
 from benchmarks.virtual_campaigns import draw_truth, measure, pose_campaign
 from rrru.diagnosis.diagnose import MeasuredRobot, diagnose
 from rrru.diagnosis.settings import GapSettings
-from rrru.diagnosis.verdict_text import answer
+from rrru.diagnosis.verdict_facts import answer
 from rrru.errors import FitError
 from rrru.robots.drive_words import drive_words
 from rrru.seeds import stream
