@@ -108,8 +108,8 @@ def _read(spec: IngestSpec, mechanism: Robot) -> tuple[Sheet, list[str]]:
     if not set(drives) & set(found) and (others := [name for name in extra if _OF_DRIVES.search(name)]):
         own = " to ".join(dict.fromkeys((drives[0], drives[-1])))
         notes.append(
-            f"{', '.join(others)} look like drive values, and those of {mechanism.name} are {own}: see that `robot` is "
-            "right"
+            f"{', '.join(others)} may be drive values of another robot, those of {mechanism.name} are {own}: see that "
+            "`robot` is right"
         )
     spec.check_drives(drives)
     frame = spec.as_meant(convert(spec, mechanism, found, cells, problems), drives)

@@ -157,8 +157,8 @@ def test_drive_values_of_another_robot_are_doubted(tmp_path):
     spec = IngestSpec(str(DATA / "field_01.csv"), extra_columns="ignore")
     said = [note for note in ingest(spec, arm).notes if note.endswith("see that `robot` is right")]
     assert said == [
-        "theta1_rad, theta2_rad, theta3_rad look like drive values, and those of arm6 are axis1_rad to axis6_rad: "
-        "see that `robot` is right"
+        "theta1_rad, theta2_rad, theta3_rad may be drive values of another robot, those of arm6 are axis1_rad to "
+        "axis6_rad: see that `robot` is right"
     ]
 
 
