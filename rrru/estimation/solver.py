@@ -211,11 +211,11 @@ class _Search:
         self.converged, self.message = True, "converged"
 
     def _free(self, triangle: FloatArray) -> npt.NDArray[np.bool_]:
-        """Parameters (p,) that can move, and are not at a bound which the gradient presses them against."""
+        """Parameters (p,) that are not at a bound which the gradient presses them against."""
         parameters, gradient = self._problem.parameters, triangle[:, :-1].T @ triangle[:, -1]
         at_low = (self.values <= parameters.low) & (gradient > 0.0)
         at_high = (self.values >= parameters.high) & (gradient < 0.0)
-        return ~(at_low | at_high) & (parameters.low < parameters.high)
+        return ~(at_low | at_high)
 
     def estimate(self, evaluations: int) -> Estimate:
         """The Estimate of where the search ended."""

@@ -124,14 +124,6 @@ def test_ill_conditioned_readings_between_bounds_end_where_the_bounded_least_squ
     assert found.end.converged and found.end.cost == pytest.approx(best.cost, rel=1e-9)
 
 
-def test_a_parameter_whose_bounds_are_equal_stays_there_while_others_reach_theirs():
-    matrix, data = np.random.default_rng(3).standard_normal((20, 3)), np.full(20, 5.0)
-    low, high = np.array([0.5, -0.1, -np.inf]), np.array([0.5, 0.1, np.inf])
-    found = solve(Problem(Bent(matrix, data), _block(3, bounds=(low, high)), lambda v: v / NOISE), [np.zeros(3)])
-    best = optimize.lsq_linear(matrix[:, 1:], data - 0.5 * matrix[:, 0], (low[1:], high[1:]), method="bvls")
-    assert found.end.converged and found.values == pytest.approx([0.5, *best.x], abs=1e-7)
-
-
 @pytest.mark.parametrize("loss", [one for one in LOSSES if one != "linear"])
 def test_robust_losses_end_where_scipy_ends(loss):
     problem, _ = _problem(1, loss=loss, outliers=8)
