@@ -73,12 +73,13 @@ _RING: style.Look = {
 
 # parts of the budget by kind
 _KIND_COLOURS = {"scatter": "#aaaaaa", "runs": "#cccccc", "unexplained": "#d55e00", "calibration": "#eeeeee"}
+_SMALL_COLOUR = "#f4f4f4"
 # of the products of two parts, which complete the parts to the whole
 _HATCH = "/////"
 # a part of so many times the whole is cancelled by others: its size says nothing
 _MOST_SHARE = 3.0
 _EFFECT_COLOURS = (style.BLUE, "#56b4e9", "#009e73", "#cc79a7", "#f0e442", "#0072b2")
-# parts of a smaller share are not drawn, or not named; names stand inside of parts wider than this for each letter
+# parts of a smaller share are drawn together, or not named; names stand inside of parts wider than this for each letter
 _LEAST_PART, _NAMED_PART, _LETTER_SHARE = 0.01, 0.03, 0.0125
 # of names above and below the bar
 _NAME_HEIGHTS = (0.34, -0.36)
@@ -99,8 +100,8 @@ def gap(tables: Tables, options: Options) -> Figure:
     in the headline is that of exactly these causes, of a group alone that one of it acts. (a) Where: measured minus
     calibrated model at the points from above and from the side, magnified as stated. (b) Why: probability of every
     effect, those of the verdict in colour, those of a group hatched. (c) Remaining gap: at points that the fit has
-    not used, under the calibrated and the corrected model, with the explained fraction of its mean square. (d)
-    Residual of every point.
+    not used, under the calibrated and the corrected model, with the explained fraction of its mean square; (?) where
+    too few readings bound it. (d) Residual of every point.
     """
     campaign, frames = options["campaign"], {}
     for name in ("gap_verdicts", "gap_attribute", "gap_shrink", "gap_budget"):
@@ -342,16 +343,18 @@ def _probability(value: float, equals: str = "", space: str = "") -> str:
 
 
 def _share(row: pd.Series, words: str = "") -> str:
-    """Explained fraction with its interval in per cent; a dash where there is none."""
+    """Explained fraction with its interval in per cent; a dash where there is none, (?) where nothing bounds it."""
     shares = [row[f"share_closed{end}"] for end in ("", "_low", "_high")]
     if not np.isfinite(shares[0]):
         return "–"
-    if words and min(shares[2], 1.0) - max(shares[1], 0.0) >= _UNDETERMINED:
+    open_ended = min(shares[2], 1.0) - max(shares[1], 0.0) >= _UNDETERMINED
+    if words and open_ended:
         return "explained fraction not determined"
     value, low, high = (f"{100.0 * share:.0f}".replace("-", "\N{MINUS SIGN}") for share in shares)
     if not np.isfinite(shares).all():
         return f"{value} %{words}"
-    return f"{value} %{words} ({'95 %: ' if words else ''}{low} to {high})"
+    interval = "?" if open_ended else f"{'95 %: ' if words else ''}{low} to {high}"
+    return f"{value} %{words} ({interval})"
 
 
 def _shades() -> ListedColormap:
@@ -456,9 +459,12 @@ def draw_budget(axes: Axes, rows: pd.DataFrame) -> None:
     """Parts of `gap_budget` one after the other: effects by share, then what does not repeat, runs and the unknown.
 
     A thin line in each part is its 95 % interval, counted from the part's beginning. Covariances of parts (hatched)
-    complete them to 1; negative ones extend to the left of 0. Where parts are many times the whole, a note says so.
+    complete them to 1; negative ones extend to the left of 0. Parts below 1 % are one part. Where parts are many times
+    the whole, a note says so.
     """
-    shown = rows[(rows["share"] > _LEAST_PART) & ~rows["kind"].isin(["covariance", "sampling"])]
+    parts = rows[~rows["kind"].isin(["covariance", "sampling"])]
+    large = parts["share"] > _LEAST_PART
+    shown, small = parts[large], float(parts.loc[~large, "share"].sum())
     effects = shown[shown["kind"] == "effect"].sort_values("share", ascending=False)
     others = [part for kind in _KIND_COLOURS for part in shown[shown["kind"] == kind].to_dict("records")]
     covariance = float(rows.loc[rows["kind"] == "covariance", "share"].sum())
@@ -467,7 +473,7 @@ def draw_budget(axes: Axes, rows: pd.DataFrame) -> None:
         axes.text(0.5, 0.5, text, transform=axes.transAxes, ha="center", va="center")
         axes.set_axis_off()
         return
-    limits = min(covariance, 0.0), max(shown["share"].sum() + max(covariance, 0.0), 1.0)
+    limits = min(covariance, 0.0), max(parts["share"].sum() + max(covariance, 0.0), 1.0)
     # names that a part has no place for, from left to right, and its middle
     names: list[tuple[str, float]] = []
     if covariance < 0.0:
@@ -487,6 +493,10 @@ def draw_budget(axes: Axes, rows: pd.DataFrame) -> None:
         elif part["share"] > _NAMED_PART:
             names.append((text, middle))
         start += part["share"]
+    if small > 0.0:
+        axes.barh(0.0, small, left=start, height=0.6, color=_SMALL_COLOUR, edgecolor="white", linewidth=0.6)
+        names += [(f"small parts {100.0 * small:.0f} %", start + 0.5 * small)] if small > _NAMED_PART else []
+        start += small
     if covariance > 0.0:
         names += _covariance(axes, covariance, start)
     _write_names(axes, names, limits)

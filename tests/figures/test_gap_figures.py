@@ -80,11 +80,11 @@ def test_both_views_hold_every_point_and_share_x(name, first, stretch, frames, t
 
 
 def test_the_budget_stands_first_and_its_parts_lie_end_to_end(frames):
-    """Effects by share, then what does not repeat and the unknown, then what completes them to the whole."""
+    """Effects by share, what does not repeat, the unknown, small parts, then what completes them to the whole."""
     axes = draw("gap", frames).axes[1]
     bars = [(bar.get_x(), bar.get_width()) for bar in axes.patches]
-    np.testing.assert_allclose([width for _, width in bars], [0.6, 0.2, 0.1, 0.05, 0.04], atol=1e-12)
-    np.testing.assert_allclose([start for start, _ in bars], [0.0, 0.6, 0.8, 0.9, 0.95], atol=1e-12)
+    np.testing.assert_allclose([width for _, width in bars], [0.6, 0.2, 0.1, 0.05, 0.01, 0.04], atol=1e-12)
+    np.testing.assert_allclose([start for start, _ in bars], [0.0, 0.6, 0.8, 0.9, 0.95, 0.96], atol=1e-12)
     named = ["link flexure 60 %", "backlash 20 %", "scatter 10 %", "unexplained 5 %", "covariance 4 %"]
     assert sorted(written(axes)) == sorted(named)
 
@@ -96,8 +96,8 @@ def test_negative_covariances_extend_the_budget_to_the_left(frames):
     axes = draw("gap", frames | {"gap_budget": budget.assign(share=shared)}).axes[1]
     bars = [(bar.get_x(), bar.get_width()) for bar in axes.patches]
     assert (0.0, -0.2) in bars and axes.get_xlim()[0] == pytest.approx(-0.2)
-    # except for the calibration's 1 %, too little to be drawn; the sampling is no part of the whole
-    assert sum(width for _, width in bars) == pytest.approx(0.99)
+    # the sampling is no part of the whole
+    assert sum(width for _, width in bars) == pytest.approx(1.0)
 
 
 def test_a_group_alone_has_its_own_probability_in_the_headline(frames):
@@ -324,6 +324,29 @@ def test_parts_that_cancel_each_other_have_no_bars(frames):
     share = budget["share"].mask(budget["part"] == "link_flexure", 30.0).mask(budget["kind"] == "covariance", -29.0)
     axes = draw("gap", frames | {"gap_budget": budget.assign(share=share)}).axes[1]
     assert not axes.patches and "no shares" in axes.texts[0].get_text()
+
+
+@pytest.mark.parametrize("covariance", [-0.3, 0.2])
+def test_the_budget_ends_at_one(covariance):
+    """With many parts too small to be drawn by themselves."""
+    rows = [(f"effect_{number}", "effect", 0.008) for number in range(10)]
+    rows += [("backlash", "effect", 1.0 - 0.08 - covariance), ("both", "covariance", covariance)]
+    table = pd.DataFrame(rows, columns=["part", "kind", "share"]).assign(share_low=0.0, share_high=0.1)
+    axes = style.new(style.DOUBLE_MM, 30.0).subplots()
+    draw_budget(axes, table)
+    widths = [bar.get_width() if bar.get_x() >= 0.0 else -bar.get_width() for bar in axes.patches]
+    assert sum(widths) == pytest.approx(1.0)
+    assert "small parts 8 %" in [text.get_text() for text in axes.texts]
+
+
+def test_a_share_of_few_readings_has_no_interval(frames):
+    table = frames["gap_shrink"]
+    wide = (table["trajectory"] != "*") & (table["step"] == table["step"].max())
+    table = table.assign(share_closed_low=table["share_closed_low"].mask(wide, -1.0))
+    table = table.assign(share_closed_high=table["share_closed_high"].mask(wide, 1.0))
+    shrink = panel(draw("gap", frames | {"gap_shrink": table}), "(c)")
+    labels = [text.get_text() for text in shrink.child_axes[0].get_yticklabels()]
+    assert [label.endswith("% (?)") for label in labels] == [False] + [True] * (len(labels) - 1)
 
 
 @pytest.mark.parametrize("covariance", [-0.55, 0.2])
