@@ -57,15 +57,15 @@ def outliers(frame: pd.DataFrame, digit_mm: float, jacobian: Callable[[], np.nda
     """Rows (n,) that a broken beam spoilt, positions being in the robot frame.
 
     digit_mm: last digit of the file; jacobian: makes the derivative (n, 3, p) of the commanded positions by the
-    geometry. It is made only for stops in no order.
+    geometry. It is made only for stops in no order: there a broken beam is twice as far off as all other readings.
     """
     target, run = command(frame), series(frame)
     deviation = measured(frame) - target
     marked = flag_outliers(deviation, run, noise_mm=digit_mm, place=path_length(target))
-    if not follows_path(target, run):
-        marked &= far_from_all(deviation, run)
-        if marked.any():
-            marked &= ~like_geometry(deviation, target, jacobian(), marked)
+    if marked.any() and not follows_path(target, run):
+        derivative = jacobian()
+        marked &= far_from_all(deviation, run, derivative, marked)
+        marked &= ~like_geometry(deviation, target, derivative, marked)
     return np.asarray(marked & ~reproduced(marked, deviation, target, run))
 
 
@@ -121,18 +121,30 @@ def frequent_jumps(deviation_mm: npt.ArrayLike, run: npt.ArrayLike, noise_mm: fl
     return result
 
 
-def far_from_all(deviation_mm: npt.ArrayLike, run: npt.ArrayLike) -> np.ndarray:
-    """Points (n,) that are many scales of their whole run off its median, for runs whose points follow no path.
+def far_from_all(
+    deviation_mm: npt.ArrayLike, run: npt.ArrayLike, jacobian: np.ndarray, marked: np.ndarray
+) -> np.ndarray:
+    """Marked points (n,) that are many scales of their whole run off its median, and twice as far as all others.
 
-    There the robot's errors differ from one point to the next as much as among all of them. Arguments as of
-    `flag_outliers`.
+    For runs whose points follow no path: there the robot's errors differ from one point to the next as much as among
+    all of them. They are largest where a pose magnifies errors of the geometry, of drives among them, and many stops
+    have the error of a tooth. So a deviation d counts by the size sqrt(d' (I + J J')^-1 d) of what makes it there;
+    jacobian (n, 3, p): derivative of the position, each parameter in units that move the points by 1 mm in the median.
+    Other arguments as of `flag_outliers`.
     """
     deviation, run = np.asarray(deviation_mm, dtype=float), np.asarray(run)
+    moved_mm = np.linalg.norm(np.nan_to_num(jacobian), axis=1)
+    usual_mm = np.median(moved_mm, axis=0)
+    scaled = np.nan_to_num(jacobian) / np.where(usual_mm > 0.0, usual_mm, np.inf)
+    spread = np.eye(3) + scaled @ np.swapaxes(scaled, 1, 2)
     result = np.zeros(len(deviation), dtype=bool)
     for rows in _runs(deviation, run):
-        off = np.linalg.norm(deviation[rows] - np.median(deviation[rows], axis=0), axis=1)
-        result[rows] = off > _MIN_SCALES * robust_sd(off, MEDIAN_OF_LENGTH, _SPIKE_MM)
-    return result
+        off = deviation[rows] - np.median(deviation[rows], axis=0)
+        size = np.sqrt(np.einsum("ni,nij,nj->n", off, np.linalg.inv(spread[rows]), off))
+        floor = _SPIKE_MM / np.sqrt(1.0 + scaled.shape[2])
+        loose = _JUMP_FACTOR * size[~marked[rows]].max(initial=0.0)
+        result[rows] = (size > _MIN_SCALES * robust_sd(size, MEDIAN_OF_LENGTH, floor)) & (size > loose)
+    return result & marked
 
 
 def like_geometry(

@@ -206,10 +206,8 @@ def _stops(command_mm, measured_mm):
     return pd.DataFrame({"trajectory": "stops", "run": 1.0, **columns})
 
 
-@pytest.mark.parametrize("seed", range(12))
-def test_errors_of_the_geometry_near_a_singularity_are_no_outliers(seed):
-    """A hexapod with legs that are off by some tenths, driven far from home; a broken beam stands out."""
-    rng = np.random.default_rng(seed)
+def _driven_far(rng):
+    """A hexapod, stops far from its home in no order, and its drives there."""
     angles = np.radians([0.0, 110.0, 120.0, 230.0, 240.0, 350.0])
     base, plate = (
         np.stack([size * np.cos(at), size * np.sin(at), 0.0 * at], axis=1)
@@ -220,7 +218,14 @@ def test_errors_of_the_geometry_near_a_singularity_are_no_outliers(seed):
     drive = home + rng.uniform(-120.0, 120.0, (300, 6))
     place = robot.forward(drive)
     known = np.isfinite(place).all(axis=1)
-    place, drive = place[known], drive[known]
+    return robot, place[known], drive[known]
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_errors_of_the_geometry_near_a_singularity_are_no_outliers(seed):
+    """A hexapod with legs that are off by some tenths, driven far from home; a broken beam stands out."""
+    rng = np.random.default_rng(seed)
+    robot, place, drive = _driven_far(rng)
     off = rng.normal(0.0, [0.3 if unit == "mm" else 1e-3 for unit in robot.parameters.units])
     attained = robot.forward(drive, off, place)
     known = np.isfinite(attained).all(axis=1)
@@ -230,3 +235,19 @@ def test_errors_of_the_geometry_near_a_singularity_are_no_outliers(seed):
     marked = outliers(_stops(place, measured), 0.001, lambda: robot.parameter_jacobian(place, drive))
     # very near a singularity the first order is not enough
     assert marked[bad] and marked.sum() <= 2
+
+
+@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("width", [0.2, 0.5])
+def test_a_drive_that_errs_over_a_part_of_its_way_gives_no_outliers(width, seed):
+    """Far more than the geometry does: many stops, some of which a singularity magnifies."""
+    rng = np.random.default_rng(seed)
+    robot, place, drive = _driven_far(rng)
+    way = (drive[:, 1] - drive[:, 1].min()) / np.ptp(drive[:, 1])
+    error = np.zeros_like(drive)
+    error[:, 1] = 0.5 * (way > 1.0 - width)
+    off = rng.normal(0.0, [0.02 if unit == "mm" else 1e-4 for unit in robot.parameters.units])
+    attained = robot.forward(drive + error, off, place)
+    known = np.isfinite(attained).all(axis=1)
+    place, drive, measured = place[known], drive[known], noisy(rng, attained[known])
+    assert not outliers(_stops(place, measured), 0.001, lambda: robot.parameter_jacobian(place, drive)).any()
