@@ -9,8 +9,8 @@ drive's measured range resolves, its principal components (Karhunen and Loeve).
 The ratio of a gear that is not stated is searched for among all orders N of one harmonic: the residual is fitted by the
 sine and cosine of N times every drive's value, together with the calibration and the known effects. The reduction of
 the sum of squares, over orders, is a periodogram (Lomb, Least-squares frequency analysis of unequally spaced data,
-Astrophysics and Space Science 39, 1976). Drives with a range of s rad resolve orders that differ by 2 pi / s, and none
-below that.
+Astrophysics and Space Science 39, 1976). Drives with a range of s rad resolve orders that differ by 2 pi / s. Slower
+waves are tried down to half of that.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -454,7 +454,7 @@ def _found(
     drives = drives_of(problem.mechanism, search.unit)
     drive, step = problem.motion.drive[:, drives][problem.at], resolution(problem.motion.drive[:, drives][problem.used])
     nuisance = np.concatenate([linear.base, *signatures(problem.library, linear, others)], axis=-1)
-    orders = np.arange(step, search.highest, step / OPTIONS.orders_per_resolution)
+    orders = searched_orders(search, step)
     if len(orders) < 3 or nuisance.shape[-1] > linear.data.size // 2:
         return effect
     gains = periodogram(linear.data, linear.drive[..., drives], drive, nuisance, orders)
@@ -471,6 +471,13 @@ def _found(
     weights = [probability / stated] * stated + [(1.0 - probability) / resolved] * (len(shapes) - stated)
     found = replace(coordinates, shapes=tuple(shapes), weights=tuple(weights), stated=stated, doubt=order_sd)
     return replace(effect, coordinates=found)
+
+
+def searched_orders(search: Search, step: float) -> FloatArray:
+    """Orders (g,) that are tried for a Search, of drives that resolve orders a step apart."""
+    fine, lowest = step / OPTIONS.orders_per_resolution, max(OPTIONS.lowest_order_ratio * step, search.lowest)
+    steps = np.arange(np.ceil((lowest - step) / fine), np.ceil((search.highest - step) / fine))
+    return np.asarray(step + fine * steps, dtype=float)
 
 
 def _vertex(orders: FloatArray, gains: FloatArray, peak: int) -> float:

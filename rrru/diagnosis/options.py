@@ -280,6 +280,9 @@ class DiagnosisOptions:
     # --- harmonics of effects ---
     # orders of the periodogram per resolved one; assumed, finer than the width of a peak
     orders_per_resolution: int = 6
+    # lowest order of the periodogram over the resolution: half a wave over the range of a drive, below which it is
+    # nearly a parabola; assumed
+    lowest_order_ratio: float = 0.5
     # peaks of a periodogram that become shapes, and shapes of an effect at most; assumed, bound the time
     max_periodogram_peaks: int = 2
     max_effect_shapes: int = 8

@@ -168,7 +168,7 @@ EffectModel = Callable[[Motion, FloatArray], Contribution]
 
 @dataclass(frozen=True)
 class Search:
-    """A continuous hyperparameter of an effect model: waves per turn of a drive, up to the highest order.
+    """A continuous hyperparameter of an effect model: waves per turn of a drive, from the lowest to the highest order.
 
     name: of the hyperparameter; unit: of the drives that have it; value: from the order to the hyperparameter; order:
     the inverse of `value`.
@@ -176,6 +176,7 @@ class Search:
 
     name: str
     unit: str
+    lowest: float
     highest: float
     value: Callable[[float], float]
     order: Callable[[float], float]

@@ -45,8 +45,8 @@ def _inverse(number: float) -> float:
 
 
 # waves per turn of the arm, and radians of the wave per millimetre of the slide
-_RATIOS = Search("ratio", "rad", 200.0, float, float)
-_LEADS = Search("lead", "mm", _inverse(_LEAD.low), _inverse, _inverse)
+_RATIOS = Search("ratio", "rad", _RATIO.low, 200.0, float, float)
+_LEADS = Search("lead", "mm", _inverse(_LEAD.high), _inverse(_LEAD.low), _inverse, _inverse)
 
 
 def for_robot(robot: Robot) -> Effect:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rrru.diagnosis.calibrate import calibrate
-from rrru.diagnosis.drive_spectra import periodogram, resolution, with_orders
+from rrru.diagnosis.drive_spectra import periodogram, resolution, searched_orders, with_orders
 from rrru.diagnosis.settings import GapSettings
 from rrru.effects.protocol import ActiveEffect
 from tests.diagnosis.campaigns import EFFECTS, NOISE_MM, ROBOT, diagnosed, measure, problem_of, strong
@@ -54,6 +54,25 @@ def test_a_ratio_that_is_not_stated_is_found(ratio, seed):
     ((key, _),) = result.state.effects.items()
     found = result.state.shape(problem.library, key)["ratio"]
     assert abs(found - ratio) < 0.15 * resolution(problem.motion.drive[problem.used])
+
+
+def test_slow_waves_are_tried_down_to_half_a_wave_over_the_range():
+    """A ratio below 1 is no gear; the highest order is not among them."""
+    search = _GEAR.coordinates.searched
+    orders = searched_orders(search, 2.8)
+    assert 1.4 <= orders[0] < 1.9 and 199.0 < orders[-1] < 200.0
+    assert np.abs(orders - 2.8).min() < 1e-12
+    np.testing.assert_allclose(np.diff(orders), 2.8 / 6)
+    assert searched_orders(search, 1.0)[0] == 1.0
+    assert searched_orders(search, 1.5)[0] == 1.0
+
+
+@pytest.mark.parametrize("waves_over_range", [0.8, 1.05, 1.3])
+def test_slow_waves_of_all_drives_are_not_taken_for_eccentric_and_oval_encoders(waves_over_range):
+    """Over a part of a turn waves of orders 1 and 2 add up to nearly any slow wave."""
+    ratio = waves_over_range * resolution(problem_of(measure()).motion.drive)
+    result = diagnosed(measure((_geared(ratio, 7, 2e-3),), seed=7))
+    assert result.verdict["effects"] == "transmission_error"
 
 
 def test_a_ratio_is_found_together_with_another_effect():

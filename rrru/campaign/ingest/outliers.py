@@ -144,7 +144,7 @@ def far_from_all(
         floor = _SPIKE_MM / np.sqrt(1.0 + scaled.shape[2])
         loose = _JUMP_FACTOR * size[~marked[rows]].max(initial=0.0)
         result[rows] = (size > _MIN_SCALES * robust_sd(size, MEDIAN_OF_LENGTH, floor)) & (size > loose)
-    return result & marked
+    return np.asarray(result & marked)
 
 
 def like_geometry(
