@@ -271,6 +271,15 @@ def test_mimics_that_cannot_be_are_refused(tmp_path, more, options, pattern):
         from_urdf(urdf(tmp_path, _mimic("j3", more)), **options)
 
 
+def test_a_second_mimic_is_refused_where_the_joint_is_of_the_chain(tmp_path):
+    """As that of a wrist that two drives hold level: the first one was ignored."""
+    text = TREE + joint_of("j3", "revolute", "two", "three", '<mimic joint="j1"/><mimic joint="j2"/>')
+    file = urdf(tmp_path, text)
+    with pytest.raises(ConfigError, match="joint j3 has 2 elements mimic; allowed: one, and a joint of its own on the"):
+        from_urdf(file, tip="three")
+    assert from_urdf(file, tip="two").parts.columns == ["j1_rad", "j2_mm"]
+
+
 def test_a_mimic_of_a_mimic_is_refused(tmp_path):
     joints = _mimic("j3", 'joint="j1"') + joint_of("j4", "revolute", "three", "four", '<mimic joint="j3"/>')
     with pytest.raises(ConfigError, match="joint j4 mimics 'j3'; allowed: driven joints of the chain, j1, j2"):
