@@ -461,16 +461,20 @@ def read_campaign(
     return Campaign(name, robot, made, read_job.read(parts.read_settings(made, name)))
 
 
-def configured_campaign(name: str, config: Mapping[str, Any] | str | Path) -> Campaign:
+def configured_campaign(name: str, config: Mapping[str, Any] | str | Path | Sequence[str | Path]) -> Campaign:
     """A measured campaign of a configuration.
 
-    config: path of a YAML file with sections `robots` and `campaigns`, or such a configuration. Raises ConfigError
-    where it has no such campaign or a virtual one, and IngestError with every problem of its file.
+    config: path of a YAML file with sections `robots` and `campaigns`, or several, each on top of the one before, or
+    such a configuration. Raises ConfigError where it has no such campaign or a virtual one, and IngestError with every
+    problem of its file.
 
     >>> configured_campaign("field_01", "config.yaml")
     Campaign('field_01', 222 readings of rrru3, noise 0.02 mm)
     """
-    whole = read_config([config]) if isinstance(config, str | Path) else config
+    if isinstance(config, Mapping):
+        whole: Mapping[str, Any] = config
+    else:
+        whole = read_config([config] if isinstance(config, str | Path) else config)
     section = parts.entry(whole, "campaigns", name, "campaign")
     if "ingest" not in section:
         raise ConfigError(f"campaign {name} is a virtual one; allowed: a measured one, or run it by snakemake")

@@ -254,6 +254,21 @@ def test_wrong_values_of_a_campaign_are_refused_in_words(monkeypatch):
         rrru.diagnose(rrru.read_campaign(FIELD, robot, noise_mm=0.02), effects=["backlash"]).write_corrected("no.urdf")
 
 
+def test_a_campaign_and_its_robot_may_be_in_different_files(tmp_path):
+    dh = [{"d_mm": 100, "a_mm": 300, "range_deg": [-90, 90]}, {"a_mm": 200, "range_deg": [10, 90]}]
+    (tmp_path / "robot.yaml").write_text(yaml.safe_dump({"robots": {"planar": {"dh": dh}}}), encoding="utf-8")
+    generator = np.random.default_rng(1)
+    drives = generator.uniform([-1.5, 0.2], [1.5, 1.5], (40, 2))
+    frame = pd.DataFrame(drives, columns=["q1_rad", "q2_rad"])
+    seen = rrru.load_robot(tmp_path / "robot.yaml").mechanism.forward(drives)
+    frame[["measured_x_mm", "measured_y_mm", "measured_z_mm"]] = seen
+    frame.to_csv(tmp_path / "run.csv", index=False)
+    section = {"campaigns": {"mine": {"robot": "planar", "ingest": str(tmp_path / "run.csv"), "noise_mm": 0.01}}}
+    (tmp_path / "run.yaml").write_text(yaml.safe_dump(section), encoding="utf-8")
+    found = rrru.configured_campaign("mine", [tmp_path / "robot.yaml", tmp_path / "run.yaml"])
+    assert found.robot.name == "planar" and len(found.measurements) == 40
+
+
 def test_numpy_values_are_taken_as_plain_ones(arm):
     """Places and names as arrays, tuples or paths make the same section as lists and texts."""
     frame = _measured(arm, np.random.default_rng(6)).assign(target="ball")

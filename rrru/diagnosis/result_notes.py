@@ -47,9 +47,10 @@ def zero_notes(estimate: Estimate, robot: Robot) -> Iterator[str]:
 
     estimate: of the robot's geometric errors. A zero that is not separately identifiable from a frame, or from the
     place of a target, has a combined offset with that where its drive slides. A zero whose variance comes from the
-    priors is not determined.
+    priors of geometric errors is not determined; one whose variance comes from that of a load has a small one.
     """
     block, names = estimate.parameters.slices[GEOMETRY], robot.parameters.names
+    of_priors = estimate.prior_shares(block)
     known = dict(zip(names, range(block.start, block.stop), strict=True))
     for drive in robot.parts.drives:
         name = f"d{drive.column.rpartition('_')[0]}"
@@ -68,7 +69,7 @@ def zero_notes(estimate: Estimate, robot: Robot) -> Iterator[str]:
                 yield f"{both}; the fitted model holds at what was read, not at other points of the platform"
             else:
                 yield f"{both}, combined they equal a zero offset of {size}"
-        elif estimate.prior_shares[number] > OPTIONS.max_prior_variance_share:
+        elif of_priors[number] > OPTIONS.max_prior_variance_share:
             yield f"{drive.site}: zero is not determined by the readings, its most probable offset is {size}"
         else:
             yield f"{drive.site}: zero, or the part that it moves, is off by {size}"
@@ -164,7 +165,7 @@ def _significant_nuisance(inference: InferenceResult) -> Iterator[tuple[str, str
         # without masses an error of the payload would be the weight of the links
         return
     block = estimate.parameters.slices[WEIGHT]
-    shares, intervals = estimate.prior_shares[block], estimate.intervals[block]
+    shares, intervals = estimate.prior_shares()[block], estimate.intervals[block]
     several_loads = len(np.unique(np.nan_to_num(problem.motion.payload_kg[problem.used]))) > 1
     for (name, unit, value, error), share, interval in zip(weight, shares, intervals, strict=True):
         if abs(value) > OPTIONS.min_nuisance_z * error and not interval[0] <= 0.0 <= interval[1]:

@@ -6,7 +6,7 @@ not:
     dl(t) = l e_k (1 - exp(-t / tau))
 
 One time constant tau holds for all links. The column below the first drive is no link: its growth moves the whole robot
-as a drift of the base does.
+as a drift of the base does. A length behind a joint that follows drives is of the link of the drive before it.
 
 Assumptions: each link has one temperature; constant power over the campaign.
 
@@ -26,9 +26,9 @@ _TYPICAL, _MOST, _SOURCE = 2e-4, 1e-2, "aluminium 2.3e-5 per kelvin; temperature
 
 
 def for_robot(robot: Robot) -> Effect | None:
-    """The effect model for an arm with two links or more that each follow a drive of their own, None for others."""
+    """The effect model for an arm with two links or more behind drives of their own, None for others."""
     legs = robot.legs
-    if len(legs.legs) != 1 or not legs.arm_joints or legs.coupling is not None:
+    if len(legs.legs) != 1 or not legs.arm_joints:
         return None
     drives = [*_links(legs)]
     if len(drives) < 2:
@@ -56,5 +56,7 @@ def _links(legs: Legs) -> dict[int, FloatArray]:
         site = legs.site_numbers[joint.name]
         if drive is not None and every[site].any():
             result.setdefault(drive + 1, np.zeros_like(every))[site] = every[site]
-        drive = joint.drive if joint.drive is not None else drive
+        # driven values of joints that follow drives come after those of the drives
+        if joint.drive is not None and joint.drive < len(legs.home_drives):
+            drive = joint.drive
     return result

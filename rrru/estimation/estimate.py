@@ -107,14 +107,14 @@ class Estimate:
         """Standard errors (p,); NaN at a bound, inf for a parameter that neither readings nor prior determine."""
         return np.where(self.at_bound, np.nan, np.sqrt(np.diag(self.covariance)))
 
-    @cached_property
-    def prior_shares(self) -> FloatArray:
-        """Shares (p,) of the variances that come from the priors and not from the noise: diag(C P C) over diag(C).
+    def prior_shares(self, priors: slice = slice(None)) -> FloatArray:
+        """Shares (p,) of the variances that come from priors and not from the noise: diag(C P C) over diag(C).
 
-        P: precisions of the priors. Next to 1 for a parameter whose unit vector the readings do not determine; NaN
-        where there is no variance.
+        P: precisions of the priors of the parameters in `priors`, by default of all. Next to 1 for a parameter whose
+        unit vector the readings do not determine; NaN where there is no variance.
         """
-        precision = self.parameters.prior_precision(self.values)
+        precision = np.zeros(len(self.values))
+        precision[priors] = self.parameters.prior_precision(self.values)[priors]
         variance = np.diag(self.covariance)
         known = (variance > 0.0) & np.isfinite(variance)
         covariance = self.covariance[np.ix_(known, known)]

@@ -423,6 +423,8 @@ def _view(
     for _, run in points.groupby("run", sort=False):
         place = run[[f"command_{axis}_mm" for axis in "xyz"]].to_numpy(dtype=float)
         steps = np.linalg.norm(np.diff(place, axis=0), axis=1)
+        # several reflectors are read at one stop
+        steps = steps[steps > 0.0]
         if len(steps) and np.median(steps) < _PATH_SHARE * span:
             axes.plot(run[across], run[up], color="#cccccc", linewidth=0.5, zorder=1)
     columns = (across, up, *(f"before_{axis}_mm" for axis in plane), "before_mm")

@@ -66,7 +66,11 @@ def read(file: Path) -> Urdf:
         if joint.get("type") not in _ALLOWED:
             odd[child] = f"joint {name} is of the type {joint.get('type')}; allowed: {', '.join(_ALLOWED)}"
         limits[name] = _limits(joint)
-        for mimic in joint.findall("mimic"):
+        followed = joint.findall("mimic")
+        if len(followed) > 1:
+            another = "a joint of its own on the same axis for each of the others"
+            odd[child] = f"joint {name} has {len(followed)} elements mimic; allowed: one, and {another}"
+        for mimic in followed:
             factor, offset = _numbers(joint, mimic, file)
             mimics[name] = mimic.get("joint"), factor, offset
             joint.remove(mimic)

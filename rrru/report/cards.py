@@ -25,7 +25,8 @@ _LEAST_MM = 0.001
 # said next to a corrected file where the instrument's frame was fitted to the commanded points
 _REGISTERED = (
     "Its positions are in the robot's frame: transform readings of the instrument by the table registration before "
-    "you compare them."
+    "you compare them. These errors are those of the points that were read. Where the places of these on the platform "
+    "were estimated, the tool and other points of the platform may be off by more."
 )
 
 

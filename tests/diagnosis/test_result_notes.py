@@ -14,6 +14,7 @@ from rrru.diagnosis.calibrate import calibrate
 from rrru.diagnosis.diagnose import MeasuredRobot, with_wide_bounds
 from rrru.diagnosis.make_problem import make_diagnosis_problem
 from rrru.diagnosis.model_fit import fit_model
+from rrru.diagnosis.payload_nuisance import WEIGHT
 from rrru.diagnosis.result_notes import (
     REPEATABILITY_UNKNOWN,
     REPEATABILITY_UNSURE,
@@ -28,6 +29,7 @@ from rrru.diagnosis.result_notes import (
 )
 from rrru.diagnosis.terms import EffectTerm
 from rrru.errors import ConfigError
+from rrru.estimation.parameters import Block, Parameters
 from rrru.kinematics.dynamics import Masses
 from rrru.robots.serial import serial
 from tests.diagnosis import campaigns
@@ -124,6 +126,27 @@ def test_a_zero_confounded_with_a_link_is_said_to_be_most_probable_only():
     unsure = replace(estimate, covariance=estimate.covariance + np.outer(direction, direction))
     (note,) = (note for note in zero_notes(unsure, problem.mechanism) if note.startswith("joint 3"))
     assert "zero is not determined by the readings, its most probable offset is 11.5 degrees (95 %: 9.2" in note
+
+
+def test_a_zero_that_is_as_good_as_the_stated_load_is_determined():
+    """Most of its variance, of some 1e-5 rad, is that of a load, which the readings determine less than its prior."""
+    generator = np.random.default_rng(3)
+    robot = _arm(generator)
+    problem = _measured(robot, {"dq3": 0.02}, generator)
+    estimate, names = fit_model(problem, [calibrate(problem)]).estimate, problem.mechanism.parameters.names
+    by_load = np.zeros(len(names))
+    by_load[names.index("dq3")] = 3.0 * estimate.standard_errors[names.index("dq3")]
+    covariance = np.block([[estimate.covariance + np.outer(by_load, by_load), by_load[:, None]], [by_load, 1.0]])
+    parameters = Parameters((*estimate.parameters.blocks, Block.of(WEIGHT, ("extra_kg",), ("kg",), 1.0)))
+    loaded = replace(
+        estimate,
+        problem=replace(estimate.problem, parameters=parameters),
+        values=np.append(estimate.values, 0.0),
+        at_bound=np.append(estimate.at_bound, False),
+        covariance=covariance,
+    )
+    (note,) = (note for note in zero_notes(loaded, problem.mechanism) if note.startswith("joint 3"))
+    assert _ZERO.match(note)
 
 
 def _weighed(passes, stated_kg, unexplained=0.0):

@@ -149,7 +149,7 @@ def test_priors_leave_the_variance_of_what_the_readings_see_in_a_sum_only():
     """Columns 1 and 4 are the same: the priors divide their sum, the readings determine the others."""
     problem, _ = _problem(3, bend=0.0, sd=0.5)
     problem.observations.matrix[:, 4] = problem.observations.matrix[:, 1]
-    shares = solve(problem, [np.zeros(6)]).prior_shares
+    shares = solve(problem, [np.zeros(6)]).prior_shares()
     # by drawing the priors' means: how far the estimate follows them, over its variance
     stacked = np.concatenate([problem.observations.matrix / NOISE, np.eye(6) / 0.5])
     means = 0.5 * np.random.default_rng(0).standard_normal((6, 4000))

@@ -155,6 +155,18 @@ def test_the_headline_says_verdict_leg_probability_and_what_to_run_next(frames):
     )
 
 
+@pytest.mark.parametrize("reflectors", [1, 2])
+def test_no_lines_connect_stops_in_no_order(frames, reflectors):
+    """The ring of the worst region is all that is drawn as a line, however many reflectors are read at a stop."""
+    points = frames["gap_points"]
+    count = len(points) // reflectors
+    places = np.random.default_rng(2).uniform(-500.0, 500.0, (count, 3)).repeat(reflectors, axis=0)
+    stops = points.iloc[: len(places)].assign(run=1, point=np.arange(len(places)), used=True)
+    frames["gap_points"] = stops.assign(**{f"command_{axis}_mm": places[:, k] for k, axis in enumerate("xyz")})
+    (ring,) = panel(draw("gap", frames), "(a)").lines
+    assert ring.get_marker() == "o"
+
+
 def test_points_left_out_are_marked_and_break_the_lines(frames):
     axes = panel(draw("gap", frames), "(d)")
     points = frames["gap_points"].sort_values(["run", "point"])

@@ -113,6 +113,25 @@ def test_compliance_acts_at_drives_and_at_the_chest():
     assert np.abs(chest).min() > 1e-7
 
 
+def test_a_link_behind_a_joint_that_follows_grows_with_the_drive_before_it():
+    """An arm whose hand a parallelogram holds level, against the same arm with the longer lengths."""
+    turning = {"range_deg": [-90, 90]}
+    lengths, strain, constant_s = np.array([500.0, 400.0, 300.0, 80.0]), np.array([1e-4, 3e-4, 2e-4]), 600.0
+
+    def arm(lengths_mm):
+        rows = [{"d_mm": lengths_mm[0], "alpha_deg": 90.0, **turning}]
+        rows += [{"a_mm": lengths_mm[1], **turning}, {"a_mm": lengths_mm[2], **turning}]
+        rows += [{"a_mm": lengths_mm[3], "drives": {"q2": -1, "q3": -1}}]
+        return make_mechanism("level", {"dh": rows})
+
+    robot, drives = arm(lengths), np.random.default_rng(7).uniform(-1.0, 1.0, (10, 3))
+    effect, motion = library(robot)["link_growth"], replace(_motion(robot, drives), time_s=np.full(10, 1e6))
+    twists = effect.contribute(motion, np.array([*strain, constant_s])).twists
+    found = robot.measured(robot.solve(drives, motion.position_mm, twists), twists)
+    longer = arm(lengths * (1.0 + strain[[0, 1, 2, 2]]))
+    np.testing.assert_allclose(found, longer.forward(drives), rtol=0.0, atol=1e-6)
+
+
 @pytest.mark.parametrize("name", ["backlash", "encoder_eccentricity", "transmission_error", "servo_lag"])
 def test_what_errs_at_a_drive_moves_the_chest_as_well(name):
     """An effect's twists are those of changed drive values."""
@@ -250,6 +269,15 @@ def test_a_mimic_has_its_factor_and_offset(tmp_path):
 def test_mimics_that_cannot_be_are_refused(tmp_path, more, options, pattern):
     with pytest.raises(ConfigError, match=pattern):
         from_urdf(urdf(tmp_path, _mimic("j3", more)), **options)
+
+
+def test_a_second_mimic_is_refused_where_the_joint_is_of_the_chain(tmp_path):
+    """As that of a wrist that two drives hold level: the first one was ignored."""
+    text = TREE + joint_of("j3", "revolute", "two", "three", '<mimic joint="j1"/><mimic joint="j2"/>')
+    file = urdf(tmp_path, text)
+    with pytest.raises(ConfigError, match="joint j3 has 2 elements mimic; allowed: one, and a joint of its own on the"):
+        from_urdf(file, tip="three")
+    assert from_urdf(file, tip="two").parts.columns == ["j1_rad", "j2_mm"]
 
 
 def test_a_mimic_of_a_mimic_is_refused(tmp_path):

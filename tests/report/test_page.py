@@ -9,7 +9,8 @@ import pytest
 from markupsafe import escape
 
 from rrru.figures import files, style
-from rrru.report import page
+from rrru.report import cards, page
+from rrru.report.worth import Worth
 from rrru.store import json_files, tables
 from tests.diagnosis.test_verdict_text import CAMPAIGN, answered
 from tests.figures import synthetic_gap, synthetic_tables
@@ -75,6 +76,14 @@ def test_errors_of_a_corrected_file_are_next_to_its_link(folder):
     worth = text.index("It is 0.31 mm rms off the diagnosed robot at the measured poses, 0.54 mm at 200 fresh ones.")
     assert link < worth < text.index(remains[1:]) and f'<p class="lead">{remains[:10]}' not in text
     assert '<p class="lead">After calibration' in text
+
+
+@pytest.mark.parametrize("registered", [True, False])
+def test_the_errors_of_a_file_are_said_to_be_those_of_the_points_that_were_read(registered):
+    """A palletiser whose reflector was right to 0.012 mm had a tool that was 0.44 mm off."""
+    facts = answered(file_error_mm=0.31, file_error_fresh_mm=0.54)
+    said = " ".join(cards.card(facts, found=Worth(144, 1.5, 0.05, registered)).worth)
+    assert ("the tool and other points of the platform may be off by more" in said) == registered
 
 
 def test_a_corrected_file_without_fresh_poses_says_so(folder):

@@ -103,5 +103,5 @@ def rows_text(numbers: Sequence[int] | pd.Index) -> str:
 
 
 def position_text(position: Iterable[float]) -> str:
-    """A position in mm for a message."""
-    return f"({', '.join(f'{value:.6g}' for value in position)}) mm"
+    """A position in mm for a message; what is below a nanometre is rounding."""
+    return f"({', '.join(f'{round(value, 6) + 0.0:.6g}' for value in position)}) mm"

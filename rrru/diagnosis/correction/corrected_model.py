@@ -180,7 +180,9 @@ def gap_rows(
             for (_, robot, _), one in zip(models, files, strict=True)
         ]
     except (ConfigError, SimulationError, UnreachableError) as error:
-        why = f"corrected model not driven, but closed at its drive values, since {error}"
+        # a semicolon separates notes
+        reason = str(error).replace("; ", ", ")
+        why = f"corrected model not driven, but closed at its drive values, since {reason}"
         poses = [_closed(inference.problem, robot, effects) for _, robot, effects in models]
     result, problem = [], inference.problem
     known = problem.on_robot & problem.complete({term.effect for term in inference.fit.terms})

@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from rrru.campaign import measurements as rows
 from rrru.campaign.ingest.campaign_file import IngestSpec, ingest
+from rrru.campaign.ingest.gross_advice import place_words
 from rrru.campaign.ingest.gross_errors import find_gross_error
 from rrru.campaign.ingest.mistakes import Mistakes
 from rrru.campaign.ingest.spec import MM
@@ -36,6 +37,12 @@ def _made(seed, kind=_arm):
     seen = seen + generator.uniform(-2000.0, 2000.0, 3) + _NOISE_MM * generator.standard_normal(seen.shape)
     columns = dict(zip(robot.parts.columns, driven.T, strict=True)) | rows.vector_columns("measured", seen)
     return robot, pd.DataFrame(columns).assign(trajectory="poses", target="ball")
+
+
+def test_a_coordinate_that_is_zero_but_for_rounding_is_said_to_be_zero():
+    """As that of a tool along an axis that no reading determines."""
+    place = np.array([90.286, -2.068e-25, -0.25])
+    assert place_words({"": place}) == "a tool at (90.286, 0, -0.25) mm (the robot's tool_mm)"
 
 
 _MOVED = "move their values {} by {} in each run, leave all other columns, and delete its {}"

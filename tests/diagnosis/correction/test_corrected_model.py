@@ -22,6 +22,7 @@ from rrru.diagnosis.schemas import tables_of
 from rrru.diagnosis.settings import GapSettings
 from rrru.effects.library import active_effects
 from rrru.effects.protocol import together
+from rrru.errors import SimulationError
 from rrru.formats.robot_file import from_mjcf
 from rrru.kinematics import general_robot
 from rrru.kinematics.dynamics import Masses
@@ -120,6 +121,16 @@ def test_a_corrected_file_that_is_no_robot_costs_nothing_but_itself(hexapod, tmp
     assert found.verdict["not_in_model"].startswith("not corrected: ") and "plate" in found.verdict["not_in_model"]
     pd.testing.assert_frame_equal(found.tables["gap_shrink"], hexapod.found.tables["gap_shrink"])
     assert ElementTree.parse(file).getroot().tag == "mujoco" and "not corrected" in file.read_text()
+
+
+def test_why_mujoco_cannot_drive_a_file_is_one_note(hexapod, tmp_path, monkeypatch):
+    def restless(*_):
+        raise SimulationError("given.xml: point 1 of 300 still moves; allowed: less than 0.01")
+
+    monkeypatch.setattr(corrected_model, "simulated", restless)
+    found = write_corrected(hexapod.found, _SECTIONS["hexapod"], _MASSES, tmp_path / "corrected.xml")
+    (note,) = (note for note in found.verdict["notes"].split("; ") if "not driven" in note)
+    assert note.endswith("since given.xml: point 1 of 300 still moves, allowed: less than 0.01")
 
 
 def test_the_corrected_file_alone_stands_where_the_calibrated_robot_does(hexapod):
