@@ -25,7 +25,7 @@ from rrru.campaign.ingest.geometry import (
 from rrru.campaign.ingest.gross_errors import GrossError, find_gross_error, frame_advice
 from rrru.campaign.ingest.gross_file import ORDINARY_SHARE, GrossFile
 from rrru.campaign.ingest.guess import guess_columns
-from rrru.campaign.ingest.outliers import jumps, outliers
+from rrru.campaign.ingest.outliers import jumps, outliers, turned_outliers
 from rrru.campaign.ingest.problems import Problems
 from rrru.campaign.ingest.registration import Registration, register
 from rrru.campaign.ingest.sheet import COMMAND, MEASURED, NOISE, TARGET, TURNS, Sheet, rows_text
@@ -297,7 +297,10 @@ def _table(
         computed |= mounted.columns(seen, registration.rotation if registration else np.eye(3))
     if sheet.spec.motion:
         computed |= sheet.spec.motion.columns()
-    frame = sheet.frame.assign(**computed, status=np.where(outlier, "outlier", "ok"))
+    frame = sheet.frame.assign(**computed)
+    if turned:
+        outlier |= turned_outliers(frame, sheet.mechanism.characteristic_length_mm)
+    frame = frame.assign(status=np.where(outlier, "outlier", "ok"))
     if outlier.any():
         count = int(outlier.sum())
         points = "1 point marked as outlier" if count == 1 else f"{count} points marked as outliers"

@@ -16,10 +16,11 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 import pandas as pd
+from scipy.spatial.transform import Rotation
 
 from rrru.campaign.driven_path import follows_path
 from rrru.campaign.ingest.checks import path_length
-from rrru.campaign.measurements import command, measured, series
+from rrru.campaign.measurements import command, measured, series, turns
 from rrru.campaign.outliers import MAX_ROBUST_SDS, MEDIAN_OF_LENGTH, robust_sd, unless_many
 from rrru.kinematics.legs import rigid_motions
 
@@ -59,8 +60,27 @@ def outliers(frame: pd.DataFrame, digit_mm: float, jacobian: Callable[[], np.nda
     digit_mm: last digit of the file; jacobian: makes the derivative (n, 3, p) of the commanded positions by the
     geometry. It is made only for stops in no order: there a broken beam is twice as far off as all other readings.
     """
+    return _spoilt(measured(frame) - command(frame), frame, digit_mm, jacobian)
+
+
+def turned_outliers(frame: pd.DataFrame, length_mm: float) -> np.ndarray:
+    """Rows (n,) whose orientation was taken wrong, as a camera does that sees a marker from the front.
+
+    frame: with orientations, commanded and measured, in the robot's frame; length_mm: at which an angle counts as the
+    way of a point there. The deviations of orientations are then judged as those of positions are.
+    """
+    off = np.full((len(frame), 3), np.nan)
+    seen, commanded = turns(frame, "measured"), turns(frame, "command")
+    known = np.isfinite(seen + commanded).all(axis=(1, 2))
+    off[known] = Rotation.from_matrix(seen[known] @ commanded[known].transpose(0, 2, 1)).as_rotvec()
+    return _spoilt(length_mm * off, frame, 0.0, lambda: np.zeros((len(frame), 3, 0)))
+
+
+def _spoilt(
+    deviation: np.ndarray, frame: pd.DataFrame, digit_mm: float, jacobian: Callable[[], np.ndarray]
+) -> np.ndarray:
+    """Rows (n,) whose deviations (n, 3) in mm are no robot's, other arguments as of `outliers`."""
     target, run = command(frame), series(frame)
-    deviation = measured(frame) - target
     marked = flag_outliers(deviation, run, noise_mm=digit_mm, place=path_length(target))
     if marked.any() and not follows_path(target, run):
         derivative = jacobian()

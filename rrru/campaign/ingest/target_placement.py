@@ -18,6 +18,7 @@ from rrru.campaign.ingest.orientations import other_readings
 from rrru.campaign.ingest.outliers import strays
 from rrru.campaign.ingest.sheet import MEASURED, TURNS, Sheet, position_text
 from rrru.campaign.ingest.zero_offsets import LARGE, found_zeros
+from rrru.campaign.outliers import MAX_ROBUST_SDS, MEDIAN_OF_LENGTH, robust_sd
 from rrru.campaign.target_registration import axes_by_turning
 from rrru.kinematics.chain import Poses
 from rrru.kinematics.readings import Readings
@@ -25,6 +26,8 @@ from rrru.kinematics.robot import Robot
 
 # the name of a reflector where the file has no such column
 _UNNAMED = "tool"
+# the mean of rotations and those that are far off it are found in so many rounds
+_ROUNDS_OF_MEAN = 5
 # residual with other places of the targets, over that with zero offsets of the drives: up to the first value the places
 # explain the readings as well, up to the second far better
 _AS_GOOD, _FAR_BETTER = 2.0, 0.5
@@ -401,8 +404,16 @@ def _place_text(place: np.ndarray, still: np.ndarray, about: float) -> str:
 
 
 def _between(poses: Poses, turns: np.ndarray, rotation: np.ndarray) -> np.ndarray:
-    """Mean rotation (3, 3) from the platform to orientations (n, 3, 3) that were measured in a frame (3, 3)."""
-    return np.asarray(_turned_off(poses, turns, rotation).mean().as_matrix())
+    """Mean rotation (3, 3) from the platform to orientations (n, 3, 3) that were measured in a frame (3, 3).
+
+    Without those that are far off the rest, as a camera takes some.
+    """
+    off = _turned_off(poses, turns, rotation)
+    mean = off.mean()
+    for _ in range(_ROUNDS_OF_MEAN):
+        away = (off * mean.inv()).magnitude()
+        mean = off[away <= MAX_ROBUST_SDS * robust_sd(away, MEDIAN_OF_LENGTH)].mean()
+    return np.asarray(mean.as_matrix())
 
 
 def _turned_off(poses: Poses, turns: np.ndarray, rotation: np.ndarray) -> Rotation:

@@ -275,6 +275,31 @@ def test_an_orientation_that_was_not_measured_is_left_blank(arm, driven, tmp_pat
     assert found.measurements["measured_x_mm"].notna().all()
 
 
+@pytest.mark.parametrize("registered", [True, False])
+@pytest.mark.parametrize(("wrong", "degrees"), [(1, 3.0), (4, 2.0), (12, 8.0), (3, 90.0)])
+def test_orientations_that_a_camera_got_wrong_are_left_out(arm, driven, tmp_path, wrong, degrees, registered):
+    generator = np.random.default_rng([wrong, int(degrees)])
+    table = _file(arm, driven, _truth(arm), registered)
+    bad = np.sort(generator.choice(len(table), wrong, replace=False))
+    axes = generator.normal(size=(wrong, 3))
+    turn = Rotation.from_rotvec(np.radians(degrees) * axes / np.linalg.norm(axes, axis=1, keepdims=True))
+    table.loc[bad, _QUATERNION] = (turn * Rotation.from_quat(table.loc[bad, _QUATERNION].to_numpy())).as_quat()
+    found = _taken(tmp_path, table, arm, frame="register" if registered else "robot")
+    np.testing.assert_array_equal(np.flatnonzero(found.measurements["status"] == "outlier"), bad)
+    right = found.measurements[found.measurements["status"] == "ok"]
+    off = rows.turns(right, "measured") @ rows.turns(right, "command").transpose(0, 2, 1)
+    assert np.abs(Rotation.from_matrix(off).as_rotvec().mean(axis=0)).max() < 2e-3
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_orientations_of_an_arm_that_is_far_off_are_no_outliers(arm, driven, tmp_path, seed):
+    """Zeros and axes off by a degree."""
+    generator = np.random.default_rng(seed)
+    truth = {one.name: 0.02 * generator.normal() for one in arm.candidates if one.unit == "rad"}
+    found = _taken(tmp_path, _file(arm, driven, truth), arm, frame="register")
+    assert found.measurements["status"].eq("ok").all()
+
+
 def _longer(table):
     return table.assign(measured_qx=table["measured_qx"] + 0.5)
 
