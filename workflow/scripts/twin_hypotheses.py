@@ -13,7 +13,7 @@ def main(settings, inputs, outputs):
     campaign = setup.virtual_campaign(settings["nominal"], virtual)
     task = twin_search.make_task(campaign, virtual, section["draws"], twin_comparisons.LINE_CALIBRATION)
     fresh = twin_search.redrawn(campaign, section["hypotheses"]["draws"])
-    start = twin.from_config(virtual) if section["refine"] else None
+    start = twin.from_config(virtual)
     frame = twin_comparisons.compare(task, fresh, section, start, settings["workers"], settings["state"])
     tables.write_all(TABLES, {"twin_hypotheses": frame}, outputs)
 
