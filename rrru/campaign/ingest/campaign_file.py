@@ -24,7 +24,7 @@ from rrru.campaign.ingest.geometry import (
 )
 from rrru.campaign.ingest.gross_errors import GrossError, find_gross_error, frame_advice
 from rrru.campaign.ingest.gross_file import ORDINARY_SHARE, GrossFile
-from rrru.campaign.ingest.guess import guess_columns
+from rrru.campaign.ingest.guess import guess_columns, guess_units
 from rrru.campaign.ingest.outliers import jumps, outliers, turned_outliers
 from rrru.campaign.ingest.problems import Problems
 from rrru.campaign.ingest.registration import Registration, register
@@ -100,7 +100,9 @@ def _read(spec: IngestSpec, mechanism: Robot) -> tuple[Sheet, list[str]]:
             raise ConfigError(f"ingest of {spec.path}: columns has the key {key!r}; allowed: {', '.join(known)}")
     problems = Problems(spec.path)
     cells = with_commands(spec, read_cells(Path(spec.path), spec.format, problems), problems)
-    found, extra = resolve(spec, cells, mechanism, problems, guess_columns(cells, mechanism, spec.columns))
+    guessed = guess_columns(cells, mechanism, spec.columns)
+    angle_unit = guess_units(cells, guessed, mechanism).get("angle_unit")
+    found, extra = resolve(spec, cells, mechanism, problems, guessed, angle_unit)
     notes = list(cells.notes)
     if extra:
         notes.append(f"undeclared columns left out: {', '.join(extra)}")

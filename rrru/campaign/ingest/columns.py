@@ -60,12 +60,18 @@ def known_columns(mechanism: Robot) -> tuple[str, ...]:
 
 
 def resolve(
-    spec: IngestSpec, cells: Cells, mechanism: Robot, problems: Problems, guessed: Mapping[str, str] | None = None
+    spec: IngestSpec,
+    cells: Cells,
+    mechanism: Robot,
+    problems: Problems,
+    guessed: Mapping[str, str] | None = None,
+    angle_unit: str | None = None,
 ) -> tuple[dict[str, str], list[str]]:
     """{ours: theirs} of the columns that a file's Cells have, and the undeclared columns.
 
-    guessed: {ours: theirs} of what undeclared columns look like, which messages propose. Missing columns, repeated
-    ones, other units and, unless `extra_columns` is "ignore", undeclared ones are noted.
+    guessed: {ours: theirs} of what undeclared columns look like, and angle_unit of the drives' values by their names,
+    which messages propose. Missing columns, repeated ones, other units and, unless `extra_columns` is "ignore",
+    undeclared ones are noted.
     """
     drives, names = mechanism.parts.columns, cells.names
     for name in sorted({name for name in names if names.count(name) > 1}):
@@ -81,7 +87,9 @@ def resolve(
             allowed = f"{unit}: convert the column, and its name"
             problems.add("unit", column=found[ours], value=f"the unit {stated}", allowed=allowed)
     # drive values determine the commanded positions as well; where some are missing, these are the problem
-    only_drives = bool(set(drives) & set(found)) and not set(COMMAND) & set(found)
+    meant = {theirs: ours for ours, theirs in (guessed or {}).items()}
+    spare = {ours: theirs for theirs, ours in meant.items() if ours in drives and theirs in extra}
+    only_drives = bool(set(drives) & {*found, *spare}) and not set(COMMAND) & set(found)
     listed = ", ".join(name for name in names if name not in cells.added)
     for ours, theirs in wanted.items():
         if ours not in found and ((ours in REQUIRED and not (only_drives and ours in COMMAND)) or ours in spec.columns):
@@ -98,10 +106,10 @@ def resolve(
             problems.add("missing column", column=", ".join(given), value=part, allowed=allowed)
     if spec.extra_columns == "refuse":
         unused = [ours for ours in wanted if ours not in found]
-        meant = {theirs: ours for ours, theirs in (guessed or {}).items()}
-        if spare := {ours: theirs for theirs, ours in meant.items() if ours in drives and theirs in extra}:
+        if spare:
             pairs = ", ".join(f'{ours}: "{theirs}"' for ours, theirs in spare.items())
-            value, allowed = "columns that look like the drives' values", f"columns: {{{pairs}}}"
+            unit = f" and angle_unit: {angle_unit}" if angle_unit and angle_unit != spec.angle_unit else ""
+            value, allowed = "columns that look like the drives' values", f"columns: {{{pairs}}}{unit}"
             problems.add("drives", column=", ".join(spare.values()), value=value, allowed=allowed)
         for name in dict.fromkeys(extra):
             if meant.get(name) in spare:

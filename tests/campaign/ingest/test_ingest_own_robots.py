@@ -120,3 +120,17 @@ def test_a_target_s_own_offset_is_no_second_problem(tmp_path):
     with pytest.raises(IngestError) as refused:
         _ingested(spoilt, tmp_path, targets={"ball": (120.0, 0.0, 0.0)})
     assert "time" in str(refused.value) and "register" not in str(refused.value)
+
+
+def test_drive_values_under_another_name_are_one_problem_with_all_that_is_to_be_written(tmp_path):
+    """Without commanded positions, which the drive values determine."""
+    frame = _file()
+    degrees = np.degrees(frame[ARM.parts.columns]).set_axis([f"j{number}_deg" for number in range(1, 7)], axis=1)
+    frame = degrees.assign(trajectory="swing", **frame[MEASURED])
+    columns = {ours: theirs for ours, theirs in zip(ARM.parts.columns, degrees.columns, strict=True)}
+    with pytest.raises(IngestError) as caught:
+        _ingested(frame, tmp_path)
+    (problem,) = str(caught.value).splitlines()
+    pairs = ", ".join(f'{ours}: "{theirs}"' for ours, theirs in columns.items())
+    assert problem.endswith(f"allowed: columns: {{{pairs}}} and angle_unit: deg")
+    assert len(_ingested(frame, tmp_path, columns=columns, angle_unit="deg").measurements) == len(frame)
