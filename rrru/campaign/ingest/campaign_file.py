@@ -181,6 +181,7 @@ def _refuse(sheet: Sheet, gross: GrossError, driven: bool) -> None:
         )
         allowed += "its description, the columns of its drives (`columns`) and the measured rows belong to each other"
     concerned = sheet.drives if driven and not gross.mistakes.of_readings else MEASURED
+    concerned = concerned if gross.mistakes.count or gross.limit_mm is not None else ("target",)
     # other units have been tried along with all other mistakes, and the instrument's frame is registered
     explained = gross.limit_mm is None and not gross.mistakes.of_units
     sheet.refuse_now(concerned, value, allowed, MistakeError if explained else GrossFileError)

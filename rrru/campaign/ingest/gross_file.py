@@ -3,7 +3,7 @@
 See `rrru.campaign.ingest.gross_errors`. Lengths in mm, angles in rad.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -148,6 +148,16 @@ class GrossFile:
         if self.count and "rad" in self.robot.parts.units:
             result += [{"angle_unit": unit} for unit in RAD if unit != self.spec.angle_unit]
         return tuple(result)
+
+    def with_exchanged_targets(self, first: Sequence[str], second: Sequence[str]) -> "GrossFile":
+        """The file with targets (a) of one end effector on another one, whose targets (b) are on the first."""
+        instead = dict.fromkeys(first, tuple(second)) | dict.fromkeys(second, tuple(first))
+        carried = tuple(
+            tuple(dict.fromkeys(new for name in hand for new in instead.get(name, (name,))))
+            for hand in self.robot.legs.end_effectors
+        )
+        legs = replace(self.robot.legs, end_effectors=carried)
+        return replace(self, robot=replace(self.robot, legs=legs))
 
     def evidence_at_most(self, mistakes: Mistakes) -> float:
         """Upper bound of the log evidence of some Mistakes, from fewer rows."""

@@ -245,6 +245,18 @@ def test_mistakes_of_robots_with_two_hands_are_named():
     assert find_gross_error(frame.drop(columns="target"), spec, robot) is None
 
 
+def test_exchanged_targets_of_two_hands_are_named(tmp_path):
+    robot, frame, spec = _two_arms(3)
+    exchanged = frame["target"].map({"left": "right", "right": "left"})
+    path = tmp_path / "file.csv"
+    frame.assign(target=exchanged).to_csv(path, index=False)
+    with pytest.raises(IngestError) as refused:
+        ingest(replace(spec, path=str(path), targets={}), robot)
+    (problem,) = refused.value.problems
+    assert problem["column"] == "target"
+    assert problem["allowed"].startswith("right and left exchanged, in this column or in `carries`, which leaves ")
+
+
 def test_what_the_message_says_of_a_left_handed_frame_mends_it(tmp_path):
     robot, frame = _made(4)
     path = tmp_path / "file.csv"
