@@ -158,7 +158,9 @@ class _Search:
     def go_on(self) -> None:
         """Evaluate the hypotheses that are one mistake away from the best ones."""
         start = sorted(self.found.values(), key=lambda one: -one.log_evidence)[:_MOST_FOLLOWED]
-        self.look_at(one for hypothesis in start for one in hypothesis.mistakes.further(self._file.units))
+        self.look_at(
+            one for hypothesis in start for one in hypothesis.mistakes.further(self._file.units, self._file.shifts)
+        )
 
     @property
     def named(self) -> list[Hypothesis]:

@@ -98,6 +98,23 @@ def test_a_wrong_place_of_the_target_is_named_with_the_right_one(seed):
     np.testing.assert_allclose(place, _PLACE_MM, atol=3.0)
 
 
+@pytest.mark.parametrize("late", [1, 3])
+def test_rows_late_by_one_or_by_a_stop_of_three_targets_are_named(late):
+    generator = np.random.default_rng(7)
+    robot, driven, position = _hexapod(generator)
+    places = np.array([[60.0, 0.0, 25.0], [-40.0, 50.0, 25.0], [-30.0, -55.0, 25.0]])
+    poses = robot.solve(driven, position)
+    seen = np.stack([poses.point(place) for place in places], axis=1).reshape(-1, 3)
+    seen = seen @ Rotation.random(random_state=generator).as_matrix().T + 0.5 * generator.standard_normal(seen.shape)
+    frame = pd.DataFrame(np.repeat(driven, 3, axis=0), columns=robot.parts.columns)
+    frame = frame.assign(trajectory="poses", target=np.tile(["a", "b", "c"], len(driven)))
+    frame = frame.assign(**rows.vector_columns("measured", seen))
+    spec = replace(_SPEC, targets={})
+    assert find_gross_error(frame, spec, robot) is None
+    found = find_gross_error(_shifted(frame, late), spec, robot)
+    assert found is not None and found.mistakes == replace(Mistakes.none(6), shift=late)
+
+
 def _scara(generator):
     """A SCARA, its drive values and positions: it turns about z only."""
     links = [{"a_mm": 400, "range_deg": [-120, 120]}, {"a_mm": 300, "alpha_deg": 180, "range_deg": [-130, 130]}]
