@@ -327,7 +327,7 @@ def _print_answer(campaign: Any, page: Path, as_options: bool) -> None:
     file = facts["corrected_file"]
     for path in sorted(page.parent.glob("corrected.*")) if file else ():
         print(f"corrected file: {path}")
-        for sentence in filter(None, (file["remainder"], *file["not_in_model"])):
+        for sentence in filter(None, (file["remainder"], *(f"not in it: {one}" for one in file["not_in_model"]))):
             print(_wrapped(f"  {sentence}"))
 
 
