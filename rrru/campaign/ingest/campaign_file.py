@@ -172,7 +172,8 @@ def _refuse(sheet: Sheet, gross: GrossError, driven: bool) -> None:
     where = "" if driven else " the commanded ones"
     value = f"{model} off{' from' * bool(where)}{where} by {gross.rms_mm:.3g} mm rms however the instrument stands"
     if not np.isfinite(gross.rms_mm):
-        value = "values at which the nominal robot has no pose in more than a tenth of the rows"
+        value = "values far outside of the drives' ranges, or at which the nominal robot has "
+        value += "no pose in more than a tenth of the rows"
     allowed = f"{gross.advice}, which leaves {gross.rms_without_mm:.3g} mm rms (probability above 0.99)"
     if gross.limit_mm is not None:
         value += f", and by {gross.rms_without_mm:.3g} mm rms at best{gross.advice}" * bool(gross.advice)

@@ -293,6 +293,18 @@ def test_a_mistake_is_undone_by_what_is_applied():
     assert mistakes.count == 2
 
 
+def test_an_arm_in_degrees_is_not_said_to_have_no_pose_alone(tmp_path):
+    robot, frame = _made(3)
+    path = tmp_path / "file.csv"
+    drives = [*robot.parts.columns]
+    frame.assign(**np.degrees(frame[drives])).to_csv(path, index=False)
+    with pytest.raises(IngestError) as refused:
+        ingest(replace(_SPEC, path=str(path)), robot)
+    (problem,) = refused.value.problems
+    assert problem["value"].startswith("values far outside of the drives' ranges, or ")
+    assert problem["allowed"].startswith("angle_unit: deg, ")
+
+
 def test_what_the_message_says_mends_the_file(tmp_path):
     robot, frame = _made(3)
     drives = [*robot.parts.columns]
