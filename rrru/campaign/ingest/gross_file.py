@@ -6,6 +6,7 @@ See `rrru.campaign.ingest.gross_errors`. Lengths in mm, angles in rad.
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import cast
 
 import numpy as np
 import pandas as pd
@@ -19,6 +20,7 @@ from rrru.campaign.ingest.zero_offsets import found_zeros
 from rrru.campaign.target_registration import TargetReadings, affine_rms, axes_by_turning, register_targets
 from rrru.errors import FitError
 from rrru.kinematics.chain import Poses
+from rrru.kinematics.end_effectors import MultiArmRobot
 from rrru.kinematics.readings import Readings
 from rrru.kinematics.robot import Robot
 
@@ -162,8 +164,9 @@ class GrossFile:
             tuple(dict.fromkeys(new for name in hand for new in instead.get(name, (name,))))
             for hand in self.robot.legs.end_effectors
         )
-        legs = replace(self.robot.legs, end_effectors=carried)
-        return replace(self, robot=replace(self.robot, legs=legs))
+        # only robots of several arms have end effectors
+        robot = cast(MultiArmRobot, self.robot)
+        return replace(self, robot=replace(robot, legs=replace(robot.legs, end_effectors=carried)))
 
     def evidence_at_most(self, mistakes: Mistakes) -> float:
         """Upper bound of the log evidence of some Mistakes, from fewer rows."""
