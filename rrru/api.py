@@ -556,7 +556,9 @@ def _entry(source: str | Path | Mapping[str, Any], name: str | None) -> tuple[st
         if chosen is None or chosen not in described:
             raise ConfigError(f"{path}: robots has no {chosen!r}; allowed: name as one of {', '.join(described)}")
         return chosen, described[chosen]
-    return name or as_name(path.stem), {_kind(path): str(path)}
+    kind, stem = _kind(path), as_name(path.stem)
+    # an entry under the name of a robot of the package would be merged into that one's
+    return name or (f"{stem}_{kind}" if stem in known else stem), {kind: str(path)}
 
 
 def _kind(path: Path) -> str:

@@ -308,6 +308,8 @@ def _print_answer(campaign: Any, page: Path, as_options: bool) -> None:
 
     as_options: repeat the keys that notes name as options of the command.
     """
+    from rrru.diagnosis.verdict_facts import not_corrected
+
     facts = json.loads(page.with_name("verdict.json").read_text(encoding="utf-8"))
     lead, *others = facts["sentences"]
     print(_wrapped(_bold(lead)))
@@ -325,9 +327,12 @@ def _print_answer(campaign: Any, page: Path, as_options: bool) -> None:
     for label, path in (("page", page), ("answer as JSON", page.with_name("verdict.json")), ("tables", page.parent)):
         print(f"{label}: {path}")
     file = facts["corrected_file"]
+    if why := not_corrected(facts):
+        print(_wrapped(f"your robot's file was {why}"))
+        return
     for path in sorted(page.parent.glob("corrected.*")) if file else ():
         print(f"corrected file: {path}")
-        for sentence in filter(None, (file["remainder"], *file["not_in_model"])):
+        for sentence in filter(None, (file["remainder"], *(f"not in it: {one}" for one in file["not_in_model"]))):
             print(_wrapped(f"  {sentence}"))
 
 

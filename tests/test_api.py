@@ -238,6 +238,13 @@ def test_a_robot_that_cannot_be_is_refused_in_words(source, options, said):
         rrru.load_robot(source, **options)
 
 
+def test_a_file_that_is_called_as_a_robot_of_the_package_is_a_robot_of_its_own():
+    delta = rrru.load_robot(DATA / "models/delta.xml", platform="plate")
+    assert delta.name == "delta_mjcf"
+    assert delta.drives == ("theta1_rad", "theta2_rad", "theta3_rad")
+    assert rrru.load_robot("delta").name == "delta"
+
+
 def test_wrong_values_of_a_campaign_are_refused_in_words(monkeypatch):
     monkeypatch.chdir(ROOT)
     robot = rrru.load_robot("rrru3")

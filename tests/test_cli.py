@@ -293,3 +293,23 @@ def test_keys_of_notes_are_options_where_no_configuration_is_given(tmp_path, cap
     cli._print_answer(SimpleNamespace(notes=("no column run",)), tmp_path / "report.html", as_options)
     said = " ".join(capsys.readouterr().out.split())
     assert ("keys that the notes name, as options of the command: --set 'signs={q2_rad: -1}'" in said) is as_options
+
+
+def test_what_a_corrected_file_lacks_is_said_to_lack(tmp_path, capsys):
+    file = {"remainder": "0.04 mm rms remain", "not_in_model": ["transmission_orders"]}
+    facts = {"sentences": ["Most of it."], "notes": [], "corrected_file": file}
+    (tmp_path / "verdict.json").write_text(json.dumps(facts), encoding="utf-8")
+    (tmp_path / "corrected.xml").write_text("", encoding="utf-8")
+    cli._print_answer(SimpleNamespace(notes=()), tmp_path / "report.html", False)
+    assert capsys.readouterr().out.endswith("corrected.xml\n  0.04 mm rms remain\n  not in it: transmission_orders\n")
+
+
+def test_a_file_that_was_not_corrected_is_not_named(tmp_path, capsys):
+    why = ["not corrected: leg 2 misses the platform by 5 mm", "allowed: up to 1 mm"]
+    facts = {"sentences": ["Most of it."], "notes": [], "corrected_file": {"remainder": "", "not_in_model": why}}
+    (tmp_path / "verdict.json").write_text(json.dumps(facts), encoding="utf-8")
+    (tmp_path / "corrected.xml").write_text("<mujoco><!-- not corrected --></mujoco>", encoding="utf-8")
+    cli._print_answer(SimpleNamespace(notes=()), tmp_path / "report.html", False)
+    said = " ".join(capsys.readouterr().out.split())
+    assert "corrected.xml" not in said
+    assert said.endswith("your robot's file was not corrected: leg 2 misses the platform by 5 mm; allowed: up to 1 mm")

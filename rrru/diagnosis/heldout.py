@@ -6,6 +6,7 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
+import pandas as pd
 from scipy.linalg import cho_solve, solve_triangular
 from scipy.special import ndtr, stdtrit
 
@@ -82,9 +83,9 @@ class HeldOut:
     def fold(self) -> IntArray:
         """Fold numbers (m,) whose complements determine the calibration, see `rrru.estimation.cross_validation`.
 
-        Runs where every trajectory was driven more than once. Else five interleaved stretches: leaving out the only
-        run of a kind would require extrapolation, which says nothing about the effect. Where one fold alone determines
-        a parameter, as of a target that was seen at a few stops, every fifth stop.
+        Runs where every trajectory was driven more than once, and with every payload. Else five interleaved stretches:
+        leaving out the only run of a kind would require extrapolation, which says nothing about the effect. Where one
+        fold alone determines a parameter, as of a target that was seen at a few stops, every fifth stop.
         """
         white = self.evidence.linear.base / self.problem.noise_mm
         return choose_folds(self._candidates(), white)
@@ -92,8 +93,11 @@ class HeldOut:
     def _candidates(self) -> Iterator[IntArray]:
         """Fold numbers (m,), the most demanding ones first."""
         frame, run = self.problem.points, self.problem.run
-        if (frame.groupby("trajectory")["run"].nunique() > 1).all():
-            yield np.unique(run, return_inverse=True)[1] % OPTIONS.max_run_folds
+        by_run = np.unique(run, return_inverse=True)[1] % OPTIONS.max_run_folds
+        repeated = frame.groupby("trajectory")["run"].nunique() > 1
+        with_payload = pd.Series(by_run).groupby(frame["payload_kg"].to_numpy()).nunique() > 1
+        if repeated.all() and with_payload.all():
+            yield by_run
         place = within(run, self.problem.stop)
         for length in (OPTIONS.points_per_stretch, 1):
             yield np.unique((place // length + run) % OPTIONS.stretch_folds, return_inverse=True)[1]

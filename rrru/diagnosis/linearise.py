@@ -29,7 +29,10 @@ def linearised(
     at, data = problem.map_of(ModelState(state.deviations, {})), problem.residual(state)
     lost = ~np.isfinite(data).all(axis=1) | ~np.isfinite(at.point_mm[problem.at]).all(axis=1)
     if lost.any():
-        raise FitError(f"the model has no pose at {int(lost.sum())} points")
+        first = problem.points[["run", "point"]].iloc[int(np.argmax(lost))]
+        where = f"{int(lost.sum())} readings, first in run {first['run']:g} at point {first['point']:g}"
+        allowed = "poses at which the loops of the robot close with its errors: leave out those next to a singularity"
+        raise FitError(f"the calibrated model has no pose at {where}; allowed: {allowed}")
     if keys is None:
         keys = [(name, k) for name, effect in problem.library.items() for k in range(len(effect.coordinates.shapes))]
     columns = {key: _columns(problem, at, key, state) for key in dict.fromkeys((*keys, *state.effects))}

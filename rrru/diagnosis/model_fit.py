@@ -34,6 +34,8 @@ from rrru.estimation.solver import SolverOptions, solve
 from rrru.kinematics.parameter_jacobian import TwistMap
 
 _SOLVER_OPTIONS = SolverOptions(step_tolerance=OPTIONS.step_tolerance_per_standard_error)
+# a standard deviation that differs by less from that of the prior is this one's
+_ROUNDING = 1e-9
 _MANY_OPTIONS = SolverOptions(OPTIONS.max_iterations_of_many, OPTIONS.step_tolerance_of_many)
 
 
@@ -224,7 +226,8 @@ class ModelFit:
     def effect_covariance(self, term: EffectTerm) -> tuple[list[str], FloatArray]:
         """Names of the q fitted shape parameters of a term's effect, and the covariance (k + q, k + q).
 
-        The covariance is of the term's k coefficients, and after them of these q parameters.
+        The covariance is of the term's k coefficients, and after them of these q parameters. A parameter on which no
+        reading depends, such as the travel of slides where only a turning drive winds up, is not fitted.
         """
         chosen, shapes = self._places_of(term)
         return shapes, self.estimate.covariance[np.ix_(chosen, chosen)]
@@ -238,9 +241,10 @@ class ModelFit:
         """Places of a term's coefficients and its effect's fitted shape parameters, and the names of these."""
         parameters, prefix = self.estimate.parameters, f"{term.effect}."
         coefficients = np.arange(len(parameters))[parameters.slices[term.effect]]
-        shapes = [name for name in parameters.names if name.startswith(prefix)]
-        chosen = [*coefficients, *(parameters.names.index(name) for name in shapes)]
-        return chosen, [name.removeprefix(prefix) for name in shapes]
+        sd = np.sqrt(np.diag(self.estimate.covariance))
+        informed = sd < (1.0 - _ROUNDING) * parameters.sd
+        shapes = [k for k, name in enumerate(parameters.names) if name.startswith(prefix) and informed[k]]
+        return [*coefficients, *shapes], [parameters.names[k].removeprefix(prefix) for k in shapes]
 
     @property
     def weight(self) -> list[tuple[str, str, float, float]]:

@@ -84,6 +84,13 @@ def _corrected_file(verdict: Facts) -> dict[str, Any] | None:
     }
 
 
+def not_corrected(facts: Facts) -> str:
+    """Why a robot's file was not corrected, from the facts of its campaign; empty where it was, or has no file."""
+    file = facts.get("corrected_file")
+    lacking = "; ".join(file["not_in_model"]) if file else ""
+    return lacking if lacking.startswith(NOT_CORRECTED) else ""
+
+
 def expected_mm(verdict: Facts) -> float:
     """Error in mm to expect of a corrected file's robot at poses and loads like those measured.
 

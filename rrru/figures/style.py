@@ -98,7 +98,8 @@ def printed(draw: Drawing) -> Drawing:
 def new(width_mm: float, height_mm: float) -> Figure:
     """An empty figure that keeps its size and arranges its panels by itself."""
     engine = ConstrainedLayoutEngine(w_pad=0.03, h_pad=0.03, wspace=0.03, hspace=0.04)
-    return Figure(figsize=(width_mm / _MM_PER_INCH, height_mm / _MM_PER_INCH), layout=engine)
+    # letters have widths that depend on the resolution: arranged at another one, labels would leave the page
+    return Figure(figsize=(width_mm / _MM_PER_INCH, height_mm / _MM_PER_INCH), dpi=_DPI, layout=engine)
 
 
 def note(text: str) -> Figure:

@@ -42,6 +42,8 @@ from rrru.parameters import ParameterSet
 SETS = ("frame", "zero", "full")
 # poses over which parameters are separable without a campaign, their tilt, and the independent share of a column needed
 _POSES, _TILT_RAD, _LEFT = 60, 0.15, 1e-6
+# of drive values at which the legs of a robot whose drives depend on each other do not close
+_HALVINGS = 6
 _SEEN = 1e-6  # share of the largest singular value that others need to count
 
 
@@ -123,7 +125,10 @@ class GeneralRobot(Robot):
         return (*drives, *open_numbers(self.measurement_config))
 
     def _workspace(self) -> tuple[FloatArray, FloatArray]:
-        """Actuator values (n, K) spread over the drives' ranges and positions (n, 3) near those of the tool."""
+        """Actuator values (n, K) spread over the drives' ranges and positions (n, 3) near those of the tool.
+
+        Values at which the legs do not close are moved half the way home, where needed again and again.
+        """
         generator = np.random.default_rng(0)
         if self._bars_only:
             low, high = np.asarray(self.drive_range, dtype=float).T
@@ -135,7 +140,13 @@ class GeneralRobot(Robot):
             return actuators[known], position[known]
         low, high = np.asarray(self.drive_range, dtype=float).T
         actuators = low + (high - low) * generator.random((_POSES, len(low)))
-        return actuators, np.tile(self.legs.home_mm, (_POSES, 1))
+        position = np.tile(self.legs.home_mm, (_POSES, 1))
+        for _ in range(_HALVINGS):
+            closed = self.solve(actuators, position).closed
+            if closed.all():
+                break
+            actuators[~closed] = 0.5 * (actuators[~closed] + self.legs.home_drives)
+        return actuators, position
 
     @cached_property
     def parameters(self) -> ParameterSet:

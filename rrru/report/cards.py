@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 from rrru.diagnosis.number_text import is_determined, percent, probability, readable, rounded, share_with_interval
-from rrru.diagnosis.verdict_facts import NOT_CORRECTED
+from rrru.diagnosis.verdict_facts import not_corrected
 from rrru.report import worth
 from rrru.report.worth import Worth
 
@@ -106,7 +106,7 @@ def card(
         _advice(facts["effects"]),
         following,
         facts["notes"],
-        [] if _not_corrected(facts) else list(models),
+        [] if not_corrected(facts) else list(models),
         "" if facts["no_answer"] else drives,
         _file_worth(facts, found is not None and found.registered),
         [] if facts["no_answer"] else _parts(facts["budget"]),
@@ -144,16 +144,9 @@ def _advice(effects: Sequence[Facts]) -> list[Advice]:
     ]
 
 
-def _not_corrected(facts: Facts) -> str:
-    """Why there is no corrected file where there could be one, empty where there is."""
-    file = facts.get("corrected_file")
-    lacking = "; ".join(file["not_in_model"]) if file else ""
-    return lacking if lacking.startswith(NOT_CORRECTED) else ""
-
-
 def _file_worth(facts: Facts, registered: bool) -> list[str]:
     """Sentences on the errors of the corrected file, which are next to its link; registered: the instrument's frame."""
-    if why := _not_corrected(facts):
+    if why := not_corrected(facts):
         return [f"Your robot's file was {why}."]
     if not (file := facts.get("corrected_file")):
         return []

@@ -130,6 +130,16 @@ def test_folds_are_runs_where_every_trajectory_was_driven_twice_else_stretches(f
         )
 
 
+def test_a_payload_of_one_run_alone_is_not_left_out_with_it():
+    spiral = FORWARD | {"trajectories": ["spiral"]}
+    twice = _setting((spiral, spiral | {"reverse": True}))
+    assert np.unique(twice.fold).tolist() == [0, 1]
+    loaded = _setting((spiral, spiral | {"payload_kg": 5.0}))
+    assert np.unique(loaded.fold).tolist() == [0, 1, 2, 3, 4]
+    for number in range(5):
+        assert set(loaded.problem.points["payload_kg"][loaded.fold != number]) == {0.0, 5.0}
+
+
 def test_errors_of_predictions_by_a_true_effect_are_noise_and_their_own_uncertainty(full):
     found = full.predict((EffectTerm("leg_asymmetry"),), [3.0], 0)
     expected = 3.0 * NOISE_MM**2 + found.uncertainty_mm2

@@ -188,7 +188,7 @@ def test_a_calibration_without_noise_finds_the_robots_errors():
 
 def test_a_model_without_a_pose_is_an_error_that_says_so(problem):
     lost = ModelState(STATE_ERRORS, {("leg_asymmetry", 0): np.tile([0.0, 0.0, -700.0], 3)})
-    with pytest.raises(FitError, match="has no pose at"):
+    with pytest.raises(FitError, match=r"has no pose at \d+ readings, first in run \d+ at point \d+; allowed: poses"):
         problem.linearise(lost)
 
 

@@ -68,3 +68,13 @@ def test_a_gear_error_of_a_ratio_that_is_not_stated_is_named_together_with_a_sli
     for k in (0, 1):
         wave = true[f"amplitude{k + 1}"] * np.sin(31.0 * motion.drive[:, k] + true[f"phase{k + 1}"])
         np.testing.assert_allclose(turned[:, k], wave, atol=1e-12)
+
+
+def test_the_travel_of_slides_is_no_number_of_a_turning_drive_s_wind_up():
+    true = {"amplitude1": 4e-4, "amplitude2": 0.0, "amplitude3": 0.0, "travel_rad": 0.05, "travel_mm": 5.0}
+    frame, known = _campaign({"friction_windup": true})
+    found = diagnose(frame, known, GapSettings(("backlash", "friction_windup"), draws=10), details=False)
+    assert found.verdict["effects"] == "friction_windup"
+    numbers = found.tables["gap_parameters"].query("effect == 'friction_windup'").set_index("parameter")
+    assert numbers["low_95"]["travel_rad"] < 0.05 < numbers["high_95"]["travel_rad"]
+    assert np.isnan(numbers.loc["travel_mm", ["standard_error", "low_95", "high_95"]].to_numpy(dtype=float)).all()

@@ -7,6 +7,7 @@ from io import BytesIO
 import numpy as np
 import pytest
 from fontTools.ttLib import TTFont
+from matplotlib.image import imread
 
 from rrru.figures import style
 
@@ -25,6 +26,15 @@ def test_magnification_is_round(largest, span, factor):
 )
 def test_numbers_are_short(value, text):
     assert style.number(value) == text
+
+
+def test_a_label_below_long_names_is_on_the_page(tmp_path):
+    figure = style.new(style.SINGLE_MM, 80.0)
+    axes = figure.subplots()
+    axes.set_xticks(range(30), ["right_arm_platform_y"] * 30, rotation=90.0, fontsize=6.0)
+    axes.set_xlabel("error parameter")
+    style.save(figure, {"png": tmp_path / "a.png"})
+    assert (imread(tmp_path / "a.png")[-2:, :, :3] == 1.0).all()
 
 
 def test_a_pdf_holds_the_glyphs_that_it_shows_and_nothing_to_lay_them_out(tmp_path):

@@ -566,3 +566,30 @@ def test_the_force_that_an_mjcf_allows_a_servo_is_its_effort(tmp_path):
     robot = from_mjcf(file_of(tmp_path, limited, "limited.xml"), "plate")
     assert robot.effort_limits[0] == 300.0 and np.isnan(robot.effort_limits[1:]).all()
     assert robot.velocity_limits is None
+
+
+def _rotary_hexapod(tmp_path):
+    """An MJCF of six cranks and six rods, whose drives have each a range of its own but depend on each other."""
+    base, plate = np.radians([-12, 12, 108, 132, 228, 252]), np.radians([-48, 48, 72, 168, 192, 288])
+    lean = base + np.radians(35) * np.tile([-1, 1], 3)
+    world, connects = f'<body name="plate" pos="0 0 0.32"><freejoint/>{GEOM}</body>', ""
+    for k in range(6):
+        foot = 0.26 * np.array([np.cos(base[k]), np.sin(base[k]), 0.0])
+        ball = 0.11 * np.array([np.cos(plate[k]), np.sin(plate[k]), 0.0])
+        crank = 0.18 * np.array([np.cos(lean[k]), np.sin(lean[k]), 0.0])
+        rod, axis = ball - foot - crank + np.array([0.0, 0.0, 0.32]), [np.sin(lean[k]), -np.cos(lean[k]), 0.0]
+        world += (
+            f'<body pos="{text_of(foot)}"><joint name="m{k}" axis="{text_of(axis)}" range="-1.2 1.2"/>{GEOM}'
+            f'<body name="rod{k}" pos="{text_of(crank)}" zaxis="{text_of(rod)}"><joint type="ball"/>{GEOM}</body>'
+            "</body>"
+        )
+        connects += f'<connect body1="plate" body2="rod{k}" anchor="{text_of(ball)}"/>'
+    return mjcf(tmp_path, world, connects, servos(*(f"m{k}" for k in range(6))))
+
+
+def test_parameters_of_a_rotary_hexapod_are_separable_without_a_campaign(tmp_path):
+    """Each leg has 11: the drive's zero, six of the circle of the crank's ball, the rod's length and three of the ball
+    on the plate. The orientation of the plate's own frame, which no position of its origin shows, is no parameter.
+    """
+    robot = from_mjcf(_rotary_hexapod(tmp_path), "plate", parameter_set="full")
+    assert len(robot.parameters) == 6 * 11 - 3

@@ -174,7 +174,8 @@ def _refuse(sheet: Sheet, gross: GrossError, driven: bool) -> None:
     where = "" if driven else " the commanded ones"
     value = f"{model} off{' from' * bool(where)}{where} by {gross.rms_mm:.3g} mm rms however the instrument stands"
     if not np.isfinite(gross.rms_mm):
-        value = "values at which the nominal robot has no pose in more than a tenth of the rows"
+        value = "values far outside of the drives' ranges, or at which the nominal robot has "
+        value += "no pose in more than a tenth of the rows"
     allowed = f"{gross.advice}, which leaves {gross.rms_without_mm:.3g} mm rms (probability above 0.99)"
     if gross.limit_mm is not None:
         value += f", and by {gross.rms_without_mm:.3g} mm rms at best{gross.advice}" * bool(gross.advice)
@@ -183,6 +184,7 @@ def _refuse(sheet: Sheet, gross: GrossError, driven: bool) -> None:
         )
         allowed += "its description, the columns of its drives (`columns`) and the measured rows belong to each other"
     concerned = sheet.drives if driven and not gross.mistakes.of_readings else MEASURED
+    concerned = concerned if gross.mistakes.count or gross.limit_mm is not None else ("target",)
     # other units have been tried along with all other mistakes, and the instrument's frame is registered
     explained = gross.limit_mm is None and not gross.mistakes.of_units
     sheet.refuse_now(concerned, value, allowed, MistakeError if explained else GrossFileError)

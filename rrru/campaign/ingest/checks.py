@@ -42,7 +42,8 @@ def number_runs(frame: pd.DataFrame, at_rest: bool = False) -> tuple[pd.DataFram
         elif not numbered and not follows_path(frame[[*COMMAND]].to_numpy(), frame["trajectory"].to_numpy()):
             again, where = False, "the trajectory's name changes, as the points follow no path"
         frame["run"] = (change | again).cumsum().astype(float)
-        notes.append(f"no column run: a new run wherever {where}, {int(frame['run'].max())} runs")
+        count = int(frame["run"].max())
+        notes.append(f"no column run: a new run wherever {where}, {count} run{'s' * (count > 1)}")
     if not numbered:
         frame["point"] = frame.groupby("run").cumcount().astype(float) + 1.0
         if not several:

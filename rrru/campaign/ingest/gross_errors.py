@@ -14,6 +14,7 @@ zero offsets of the drives, is not of this robot. Lengths in mm, angles in rad.
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
+from itertools import combinations, product
 
 import numpy as np
 import pandas as pd
@@ -51,8 +52,8 @@ _MOST_NAMED = 6
 class GrossError:
     """Why a file cannot be right: its rms in mm as it is and at best, and the advice, in words.
 
-    mistakes: the most probable ones; limit_mm: rms that a file of this robot leaves at most, where not even these
-    explain it, None where they do.
+    mistakes: the most probable ones, none where targets of end effectors are exchanged; limit_mm: rms that a file of
+    this robot leaves at most, where not even these explain it, None where they do.
     """
 
     mistakes: Mistakes
@@ -97,7 +98,7 @@ def find_gross_error(
     if named := search.named:
         words = " or ".join(advice(file, one) for one in named)
         return GrossError(named[0].mistakes, as_is.rms_mm, named[0].rms_mm, words)
-    return _foreign(file, as_is, search.best)
+    return _exchanged_targets(file, as_is) or _foreign(file, as_is, search.best)
 
 
 def frame_advice(file: GrossFile | None) -> str:
@@ -157,7 +158,9 @@ class _Search:
     def go_on(self) -> None:
         """Evaluate the hypotheses that are one mistake away from the best ones."""
         start = sorted(self.found.values(), key=lambda one: -one.log_evidence)[:_MOST_FOLLOWED]
-        self.look_at(one for hypothesis in start for one in hypothesis.mistakes.further(self._file.units))
+        self.look_at(
+            one for hypothesis in start for one in hypothesis.mistakes.further(self._file.units, self._file.shifts)
+        )
 
     @property
     def named(self) -> list[Hypothesis]:
@@ -173,6 +176,21 @@ class _Search:
         chosen, limit = every[:number], EXPLAINED_SHARE * self._file.robot.size_mm
         right = number <= _MOST_NAMED and all(one.mistakes.count and one.rms_mm <= limit for one in chosen)
         return chosen if right and probability[:number].sum() > _CERTAIN else []
+
+
+def _exchanged_targets(file: GrossFile, as_is: Hypothesis) -> GrossError | None:
+    """The GrossError of a file in which targets of two end effectors have each other's names; None for others.
+
+    All targets of both, or one of each, are exchanged.
+    """
+    limit_mm = EXPLAINED_SHARE * file.robot.size_mm
+    for one, other in combinations(file.robot.legs.end_effectors, 2):
+        for first, second in dict.fromkeys([(one, other), *(((a,), (b,)) for a, b in product(one, other))]):
+            rms_mm = file.with_exchanged_targets(first, second).hypothesis(file.given).rms_mm
+            if rms_mm <= limit_mm:
+                words = f"{', '.join(first)} and {', '.join(second)} exchanged, in this column or in `carries`"
+                return GrossError(file.given, as_is.rms_mm, rms_mm, words)
+    return None
 
 
 def _foreign(file: GrossFile, as_is: Hypothesis, best: Hypothesis) -> GrossError | None:

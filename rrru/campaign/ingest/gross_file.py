@@ -3,22 +3,24 @@
 See `rrru.campaign.ingest.gross_errors`. Lengths in mm, angles in rad.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import cast
 
 import numpy as np
 import pandas as pd
 
 from rrru.campaign import measurements as rows
 from rrru.campaign.ingest.frames import Frames
-from rrru.campaign.ingest.mistakes import Mistakes
+from rrru.campaign.ingest.mistakes import SHIFTS, Mistakes
 from rrru.campaign.ingest.sheet import COMMAND, MEASURED, TARGET, TURNS
 from rrru.campaign.ingest.spec import MM, RAD, IngestSpec
 from rrru.campaign.ingest.zero_offsets import found_zeros
 from rrru.campaign.target_registration import TargetReadings, affine_rms, axes_by_turning, register_targets
 from rrru.errors import FitError
 from rrru.kinematics.chain import Poses
+from rrru.kinematics.end_effectors import MultiArmRobot
 from rrru.kinematics.readings import Readings
 from rrru.kinematics.robot import Robot
 
@@ -149,6 +151,23 @@ class GrossFile:
             result += [{"angle_unit": unit} for unit in RAD if unit != self.spec.angle_unit]
         return tuple(result)
 
+    @property
+    def shifts(self) -> tuple[int, ...]:
+        """Rows by which the measured columns may be late: few, or one stop at which every target was read."""
+        stop = len(self.names)
+        return tuple(dict.fromkeys((*SHIFTS, stop, -stop)))
+
+    def with_exchanged_targets(self, first: Sequence[str], second: Sequence[str]) -> "GrossFile":
+        """The file with targets (a) of one end effector on another one, whose targets (b) are on the first."""
+        instead = dict.fromkeys(first, tuple(second)) | dict.fromkeys(second, tuple(first))
+        carried = tuple(
+            tuple(dict.fromkeys(new for name in hand for new in instead.get(name, (name,))))
+            for hand in self.robot.legs.end_effectors
+        )
+        # only robots of several arms have end effectors
+        robot = cast(MultiArmRobot, self.robot)
+        return replace(self, robot=replace(robot, legs=replace(robot.legs, end_effectors=carried)))
+
     def evidence_at_most(self, mistakes: Mistakes) -> float:
         """Upper bound of the log evidence of some Mistakes, from fewer rows."""
         at = self._rows(mistakes.shift)
@@ -215,7 +234,7 @@ class GrossFile:
     @cached_property
     def _ways(self) -> int:
         """Number of single mistakes."""
-        return len([*self.given.further(self.units)])
+        return len([*self.given.further(self.units, self.shifts)])
 
     def _spread(self, readings: TargetReadings) -> float:
         """Spread of the poses that carry the targets; turns count by the robot's characteristic length."""
@@ -308,12 +327,12 @@ class GrossFile:
         )
 
     def _rows(self, shift: int) -> np.ndarray:
-        """Rows (m,) whose measured values, so many rows on, are of the same run and target."""
+        """Rows (m,) that have measured values, so many rows on, of the same run."""
         if not shift:
             return self.chosen
         there = self.chosen + shift
         at = self.chosen[(there >= 0) & (there < len(self.run))]
-        same = (self.run[at] == self.run[at + shift]) & (self.target[at] == self.target[at + shift])
+        same = self.run[at] == self.run[at + shift]
         return np.asarray(at[same & np.isfinite(self.measured_mm[at + shift]).all(axis=1)])
 
 

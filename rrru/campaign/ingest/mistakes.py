@@ -11,7 +11,7 @@ import numpy as np
 # prior probability that a file has a gross mistake, shared by all that are tried; assumed
 _PRIOR = 0.01
 # rows that a column may be shifted by
-_SHIFTS = (1, -1, 2, -2)
+SHIFTS = (1, -1, 2, -2)
 # all orders of so many drives are tried together with other mistakes, all orders and signs of more by themselves
 _MOST_ORDERED, _MOST_PERMUTED = 4, 6
 
@@ -82,15 +82,18 @@ class Mistakes:
             signs[drive] = self.signs[drive] * first.signs[k]
         return replace(self, signs=tuple(signs), order=tuple(self.order[k] for k in first.order))
 
-    def further(self, units: tuple[Mapping[str, str], ...]) -> Iterator["Mistakes"]:
-        """All that are one mistake away; units: which others readings and drive values may be in."""
+    def further(self, units: tuple[Mapping[str, str], ...], shifts: tuple[int, ...] = SHIFTS) -> Iterator["Mistakes"]:
+        """All that are one mistake away.
+
+        units: which others readings and drive values may be in; shifts: rows that a column may be shifted by.
+        """
         count = len(self.signs)
         for k in range(count):
             yield replace(self, signs=(*self.signs[:k], -self.signs[k], *self.signs[k + 1 :]))
         yield replace(self, signs=(-1,) * count)
         for order in usual_orders(count):
             yield self.reordered(order)
-        for shift in _SHIFTS:
+        for shift in shifts:
             yield replace(self, shift=shift)
         yield replace(self, free=True)
         yield replace(self, mirrored=True)

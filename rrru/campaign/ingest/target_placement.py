@@ -48,6 +48,10 @@ _MAX_TURNED_RAD = 0.2
 _MAX_SCATTER_RAD = 0.1
 # another convention of the orientations (unit, sequence, order) is the right one where it leaves less than this share
 _FAR_LESS = 0.2
+# the platform of a delta turns by some mrad where its bars differ, and a reflector 40 mm off the tool moves by microns
+_STATE_PLACE = (
+    "state it in `targets`, since small turns of the platform by the robot's errors move it in an unknown way"
+)
 
 
 @dataclass(frozen=True)
@@ -316,7 +320,7 @@ def _place_notes(
             result.append(f"reflector {name} found at {position_text(place[k])}, fixed to the world")
         elif not np.isfinite(errors).any():
             at = f"reflector {name} assumed at {position_text(place[k])} on the platform, the mean of all at the tool"
-            result.append(f"{at}: a platform that never turns does not determine it")
+            result.append(f"{at}: a platform that never turns does not determine it, {_STATE_PLACE}")
         else:
             known = np.isfinite(errors)
             moves = by_zeros[name] @ axes[:, known]

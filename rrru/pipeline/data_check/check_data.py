@@ -203,7 +203,8 @@ def print_check(
     for problem in found.refused[:_SHOWN]:
         print(f"refused: {IngestError([problem])}")
     if len(found.refused) > _SHOWN:
-        print(f"refused: {len(found.refused) - _SHOWN} problems more")
+        # of each kind only the first ones are known here
+        print("refused: and more, which a run lists")
     print(f"\n{_UNFINISHED if found.refused else 'overlay to paste:'}\n")
     name = found.section["robot"]
     own = {name: config["robots"][name]} if own_robot(config["robots"][name]) and not overlays else {}

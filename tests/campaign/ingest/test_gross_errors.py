@@ -98,6 +98,23 @@ def test_a_wrong_place_of_the_target_is_named_with_the_right_one(seed):
     np.testing.assert_allclose(place, _PLACE_MM, atol=3.0)
 
 
+@pytest.mark.parametrize("late", [1, 3])
+def test_rows_late_by_one_or_by_a_stop_of_three_targets_are_named(late):
+    generator = np.random.default_rng(7)
+    robot, driven, position = _hexapod(generator)
+    places = np.array([[60.0, 0.0, 25.0], [-40.0, 50.0, 25.0], [-30.0, -55.0, 25.0]])
+    poses = robot.solve(driven, position)
+    seen = np.stack([poses.point(place) for place in places], axis=1).reshape(-1, 3)
+    seen = seen @ Rotation.random(random_state=generator).as_matrix().T + 0.5 * generator.standard_normal(seen.shape)
+    frame = pd.DataFrame(np.repeat(driven, 3, axis=0), columns=robot.parts.columns)
+    frame = frame.assign(trajectory="poses", target=np.tile(["a", "b", "c"], len(driven)))
+    frame = frame.assign(**rows.vector_columns("measured", seen))
+    spec = replace(_SPEC, targets={})
+    assert find_gross_error(frame, spec, robot) is None
+    found = find_gross_error(_shifted(frame, late), spec, robot)
+    assert found is not None and found.mistakes == replace(Mistakes.none(6), shift=late)
+
+
 def _scara(generator):
     """A SCARA, its drive values and positions: it turns about z only."""
     links = [{"a_mm": 400, "range_deg": [-120, 120]}, {"a_mm": 300, "alpha_deg": 180, "range_deg": [-130, 130]}]
@@ -245,6 +262,18 @@ def test_mistakes_of_robots_with_two_hands_are_named():
     assert find_gross_error(frame.drop(columns="target"), spec, robot) is None
 
 
+def test_exchanged_targets_of_two_hands_are_named(tmp_path):
+    robot, frame, spec = _two_arms(3)
+    exchanged = frame["target"].map({"left": "right", "right": "left"})
+    path = tmp_path / "file.csv"
+    frame.assign(target=exchanged).to_csv(path, index=False)
+    with pytest.raises(IngestError) as refused:
+        ingest(replace(spec, path=str(path), targets={}), robot)
+    (problem,) = refused.value.problems
+    assert problem["column"] == "target"
+    assert problem["allowed"].startswith("right and left exchanged, in this column or in `carries`, which leaves ")
+
+
 def test_what_the_message_says_of_a_left_handed_frame_mends_it(tmp_path):
     robot, frame = _made(4)
     path = tmp_path / "file.csv"
@@ -262,6 +291,18 @@ def test_a_mistake_is_undone_by_what_is_applied():
     # the first column is of the third drive
     np.testing.assert_array_equal(mistakes.applied(drive), [[1.0, -2.0, 0.0], [4.0, -5.0, 3.0]])
     assert mistakes.count == 2
+
+
+def test_an_arm_in_degrees_is_not_said_to_have_no_pose_alone(tmp_path):
+    robot, frame = _made(3)
+    path = tmp_path / "file.csv"
+    drives = [*robot.parts.columns]
+    frame.assign(**np.degrees(frame[drives])).to_csv(path, index=False)
+    with pytest.raises(IngestError) as refused:
+        ingest(replace(_SPEC, path=str(path)), robot)
+    (problem,) = refused.value.problems
+    assert problem["value"].startswith("values far outside of the drives' ranges, or ")
+    assert problem["allowed"].startswith("angle_unit: deg, ")
 
 
 def test_what_the_message_says_mends_the_file(tmp_path):

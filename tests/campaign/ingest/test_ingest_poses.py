@@ -452,6 +452,7 @@ def test_the_place_on_a_platform_that_never_turns_is_an_assumption(tmp_path):
     notes = _taken(tmp_path, table, robot, frame="register").notes
     assumed = [note for note in notes if note.startswith("reflector ")]
     assert len(assumed) == 2 and all("assumed at" in note and "does not determine it" in note for note in assumed)
+    assert all("state it in `targets`" in note for note in assumed)
 
 
 def _scara_of(first_mm, second_mm):

@@ -416,7 +416,7 @@ ROWS = {
         {},
         None,
         THETAS,
-        "values at which the nominal robot has no pose",
+        "values far outside of the drives' ranges, or at which the nominal robot has no pose",
         "angle_unit: deg, which leaves",
     ),
     "radians as degrees": (

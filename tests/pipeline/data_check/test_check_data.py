@@ -162,6 +162,14 @@ def test_what_is_refused_is_not_offered_for_pasting(tmp_path, monkeypatch, capsy
     assert "NOT ACCEPTED YET" in text and "to paste" not in text
 
 
+def test_of_many_problems_the_first_are_shown_and_none_is_counted(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(ROOT)
+    FIELD.assign(measured_x_mm="", measured_y_mm="").to_csv(tmp_path / "a.csv", index=False)
+    assert main([str(tmp_path / "a.csv"), "--robot", "rrru3"]) == 1
+    refused = [line for line in capsys.readouterr().out.splitlines() if line.startswith("refused: ")]
+    assert len(refused) == 9 and refused[-1] == "refused: and more, which a run lists"
+
+
 def test_a_file_that_holds_everything_costs_nothing(tmp_path):
     found = checked(
         FIELD, tmp_path, campaigns={"a": {"robot": "rrru3", "ingest": str(tmp_path / "mine.csv"), "noise_mm": 0.02}}
