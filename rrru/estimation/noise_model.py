@@ -251,20 +251,25 @@ def high_frequency_noises(
     """Standard deviations of chosen rows (m,) and of the others by `high_frequency_noise`, NaN where it has none.
 
     Under one weight for all rows the residuals of the quieter rows have a part of the noise of the others. All rows are
-    therefore divided by the standard deviation of their kind, and estimated again, until both ratios agree.
+    therefore divided by the standard deviation of their kind, and estimated again, until both ratios agree. Where the
+    ratio runs away, as many columns fit the quieter rows exactly, one weight holds for all.
     """
-    ratio = 1.0
-    for _ in range(_MAX_WEIGHTINGS):
+    ratio, step, equal = 1.0, np.inf, (np.nan, np.nan)
+    for number in range(_MAX_WEIGHTINGS):
         weight = np.where(chosen, 1.0, ratio)[:, None]
         weighted, its_columns = data * weight, columns * weight[..., None]
         found, its_others = (high_frequency_noise(weighted, its_columns, series, kind) for kind in (chosen, ~chosen))
         others = its_others / ratio
+        equal = equal if number else (found, others)
         if not (found > 0.0 and others > 0.0):
-            break
+            return equal
         before, ratio = ratio, found / others
-        if abs(ratio / before - 1.0) < _WEIGHT_TOLERANCE:
-            break
-    return found, others
+        last, step = step, abs(np.log(ratio / before))
+        if step < _WEIGHT_TOLERANCE:
+            return found, others
+        if number and step > last:
+            return equal
+    return equal
 
 
 def p_value(data: FloatArray, columns: FloatArray, block: FloatArray, prior_sd: FloatArray | None = None) -> float:
