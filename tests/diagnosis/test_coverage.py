@@ -123,7 +123,7 @@ def _held_out_of_targets(generator, poses=120):
     run = np.repeat([1, 2], poses)
     data = NOISE_MM * generator.standard_normal((count, 3))
     linear = LinearizedProblem(data, columns, {}, {}, {}, np.zeros((count, 3, 0)))
-    points = pd.DataFrame({"trajectory": "poses", "run": run})
+    points = pd.DataFrame({"trajectory": "poses", "run": run, "payload_kg": np.nan})
     problem = SimpleNamespace(points=points, run=run, stop=np.arange(count), series=run, noise_mm=NOISE_MM)
     return HeldOut(problem, ModelEvidence({}, linear, run, NoiseModel.white(NOISE_MM), False)), columns
 
