@@ -26,8 +26,12 @@ from rrru.kinematics.robot import Robot
 
 # the name of a reflector where the file has no such column
 _UNNAMED = "tool"
+# rotation matrices whose elements differ by less are the same: the platform never turns
+_SAME_ORIENTATION = 1e-6
 # the mean of rotations and those that are far off it are found in so many rounds
 _ROUNDS_OF_MEAN = 5
+# ASSUME what is nearer to it is no gross error of a camera: least squares of all readings have the plain mean
+_GROSS_RAD = 0.02
 # residual with other places of the targets, over that with zero offsets of the drives: up to the first value the places
 # explain the readings as well, up to the second far better
 _AS_GOOD, _FAR_BETTER = 2.0, 0.5
@@ -124,12 +128,9 @@ def target_placement(sheet: Sheet) -> TargetPlacement | None:
         _refuse_places(sheet, left_mm, lost)
         notes += _lost_zero_notes(sheet, (zeros, far), left_mm) if lost else ()
     free = ~frames.known & ~frames.on_world
-    if registered and free.all():
-        # along axes that never turn they are confounded with the frame's shift: their mean is set to the tool
-        axes, turned_by = axes_by_turning(poses.turn)
-        still = axes[:, turned_by == 0.0]
-        off_mm = np.asarray(sheet.mechanism.tool_mm) - np.unique(place, axis=0).mean(axis=0)
-        place = place + still @ still.T @ off_mm
+    if registered and free.all() and np.ptp(poses.turn, axis=0).max() < _SAME_ORIENTATION:
+        # for a platform that never turns they are confounded with the frame's shift: their mean is set to the tool
+        place = place + np.asarray(sheet.mechanism.tool_mm) - np.unique(place, axis=0).mean(axis=0)
     turn = np.eye(3)
     if named and not set(frames.names) <= set(sheet.spec.targets):
         posed = poses, sheet.actuators(command) + zeros, command
@@ -416,7 +417,7 @@ def _between(poses: Poses, turns: np.ndarray, rotation: np.ndarray) -> np.ndarra
     mean = off.mean()
     for _ in range(_ROUNDS_OF_MEAN):
         away = (off * mean.inv()).magnitude()
-        mean = off[away <= MAX_ROBUST_SDS * robust_sd(away, MEDIAN_OF_LENGTH)].mean()
+        mean = off[away <= max(MAX_ROBUST_SDS * robust_sd(away, MEDIAN_OF_LENGTH), _GROSS_RAD)].mean()
     return np.asarray(mean.as_matrix())
 
 
