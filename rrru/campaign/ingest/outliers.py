@@ -148,7 +148,7 @@ def far_from_all(
 
     For runs whose points follow no path: there the robot's errors differ from one point to the next as much as among
     all of them. They are largest where a pose magnifies errors of the geometry, of drives among them, and a local error
-    of a drive is that of several stops. So a deviation d counts by the size sqrt(d' (I + J J')^-1 d) of what makes it there;
+    of a drive is that of several stops. So a deviation d counts by the size sqrt(d' (I + J J')^-1 d) of what makes it;
     jacobian (n, 3, p): derivative of the position, each parameter in units that move the points by 1 mm in the median.
     Other arguments as of `flag_outliers`.
     """
