@@ -10,7 +10,7 @@ from rrru.calibration.campaign_fit import select
 from rrru.campaign import measurements as rows
 from rrru.campaign.noise import quieter_repeats, read_noise, reading_series
 from rrru.errors import ConfigError
-from rrru.estimation.noise_model import high_frequency_noise
+from rrru.estimation.noise_model import high_frequency_noises
 from rrru.kinematics.robot import Robot
 
 
@@ -55,15 +55,13 @@ def campaign_noise(
     fit, used = calibrate(residuals), measurements[rows.usable(measurements, use_near_singularity)]
     left, columns = residuals.residual(fit.deviations), residuals.jacobian(fit.deviations)
     series, positions = reading_series(used, residuals.readings), np.arange(len(left)) < len(used)
+    found_mm, turned_mm = high_frequency_noises(left, columns, series, positions)
     found_rad, rad_source = np.nan, ""
     if turned:
-        found_rad = (
-            noise_rad or high_frequency_noise(left, columns, series, ~positions) / robot.characteristic_length_mm
-        )
+        found_rad = noise_rad or turned_mm / robot.characteristic_length_mm
         rad_source = "given" if noise_rad else "high_frequency"
     if noise_mm is not None:
         return Noise(noise_mm, found_rad, known, rad_source)
-    found_mm = high_frequency_noise(left, columns, series, positions)
     if np.isnan(found_mm):
         raise ConfigError("too few usable points to estimate noise_mm; give it")
     repeated = quieter_repeats(used, found_mm)

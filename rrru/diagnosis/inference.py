@@ -34,7 +34,7 @@ from rrru.estimation.noise_model import (
     alike,
     fit_noise,
     free_numbers,
-    high_frequency_noise,
+    high_frequency_noises,
     p_value,
 )
 
@@ -107,8 +107,7 @@ def with_characteristic_length(
     """
     if not (noise_mm and noise_rad):
         linear, columns = _few(problem, calibrate(problem))
-        both = (problem.positions, ~problem.positions)
-        found, turned = (high_frequency_noise(linear.data, columns, problem.series, chosen) for chosen in both)
+        found, turned = high_frequency_noises(linear.data, columns, problem.series, problem.positions)
         if noise_rad:
             found = noise_mm or noise.quieter_repeats(problem.measurements[problem.used], found) or found
         noise_mm, noise_rad = found, noise_rad or turned / problem.characteristic_length_mm

@@ -60,6 +60,8 @@ _NONE = 0.5
 _ROUNDS, _LEAST_LEFT, _RANK = 4, 0.02, 1e-9
 # how much coefficients with a prior explain depends on the noise: it is found in more rounds
 _ROUNDS_OF_PRIORS = 20
+# weights of two kinds of readings are found to this share, in at most so many rounds
+_WEIGHT_TOLERANCE, _MAX_WEIGHTINGS = 0.01, 20
 # with more columns than this the rank comes from their squares, to fewer digits
 _MANY, _RANK_OF_SQUARES = 400, 1e-12
 # rows of these that are taken at a time
@@ -241,6 +243,33 @@ def high_frequency_noise(
     left, share = _left(flat[:, -1], flat[:, :-1])
     seen = _Seen((left**2).reshape(-1, 3), share.reshape(-1, 3), wave, lengths(series))
     return seen.rough(chosen)
+
+
+def high_frequency_noises(
+    data: FloatArray, columns: FloatArray, series: npt.NDArray[np.generic], chosen: npt.NDArray[np.bool_]
+) -> tuple[float, float]:
+    """Standard deviations of chosen rows (m,) and of the others by `high_frequency_noise`, NaN where it has none.
+
+    Under one weight for all rows the residuals of the quieter rows have a part of the noise of the others. All rows are
+    therefore divided by the standard deviation of their kind, and estimated again, until both ratios agree. Where the
+    ratio runs away, as many columns fit the quieter rows exactly, one weight holds for all.
+    """
+    ratio, step, equal = 1.0, np.inf, (np.nan, np.nan)
+    for number in range(_MAX_WEIGHTINGS):
+        weight = np.where(chosen, 1.0, ratio)[:, None]
+        weighted, its_columns = data * weight, columns * weight[..., None]
+        found, its_others = (high_frequency_noise(weighted, its_columns, series, kind) for kind in (chosen, ~chosen))
+        others = its_others / ratio
+        equal = equal if number else (found, others)
+        if not (found > 0.0 and others > 0.0):
+            return equal
+        before, ratio = ratio, found / others
+        last, step = step, abs(np.log(ratio / before))
+        if step < _WEIGHT_TOLERANCE:
+            return found, others
+        if number and step > last:
+            return equal
+    return equal
 
 
 def p_value(data: FloatArray, columns: FloatArray, block: FloatArray, prior_sd: FloatArray | None = None) -> float:

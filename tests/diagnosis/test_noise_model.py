@@ -15,7 +15,7 @@ from rrru.diagnosis.inference import with_noise
 from rrru.diagnosis.make_problem import make_diagnosis_problem
 from rrru.diagnosis.settings import GapSettings
 from rrru.diagnosis.whitened import spectrum
-from rrru.estimation.noise_model import NoiseModel, fit_noise, half_waves, lengths
+from rrru.estimation.noise_model import NoiseModel, fit_noise, half_waves, high_frequency_noises, lengths
 from tests.diagnosis import arms
 from tests.diagnosis.campaigns import MASSES, NOISE_MM, ROBOT, diagnosed, measure, strong
 
@@ -141,6 +141,18 @@ def _noise_of_arm(seed, stated_mm=None):
     linear = replace(linear, columns=linear.columns | problem.linearise(calibrate(problem), orders).columns)
     found, _ = with_noise(problem, linear, stated_mm)
     return found.noise_mm / arms.NOISE_MM
+
+
+@pytest.mark.parametrize("true", [(1.0, 6.0), (6.0, 1.0)])
+def test_the_noise_of_one_kind_of_readings_is_no_part_of_that_of_the_other(true):
+    """Columns that take half of all numbers, as those of a whole library do in a campaign of few poses."""
+    generator, found = np.random.default_rng(4), []
+    positions = np.arange(240) < 120
+    series, size = np.where(positions, 0, 1), np.where(positions, *true)[:, None]
+    for _ in range(20):
+        data, columns = size * generator.standard_normal((240, 3)), generator.standard_normal((240, 3, 360))
+        found.append(high_frequency_noises(data, columns, series, positions))
+    assert np.mean(found, axis=0) == pytest.approx(true, rel=0.05)
 
 
 def test_orders_that_were_searched_for_do_not_bias_the_noise():
