@@ -97,7 +97,9 @@ def find_gross_error(
     search.settle()
     if named := search.named:
         words = " or ".join(advice(file, one) for one in named)
-        return GrossError(named[0].mistakes, as_is.rms_mm, named[0].rms_mm, words)
+        # of hypotheses that differ by rounding, as on a symmetric robot, rounding must not choose
+        concerned = next((one.mistakes for one in named if not one.mistakes.of_readings), named[0].mistakes)
+        return GrossError(concerned, as_is.rms_mm, named[0].rms_mm, words)
     return _exchanged_targets(file, as_is) or _foreign(file, as_is, search.best)
 
 

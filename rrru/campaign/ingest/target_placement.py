@@ -26,8 +26,9 @@ from rrru.kinematics.robot import Robot
 
 # the name of a reflector where the file has no such column
 _UNNAMED = "tool"
-# rotation matrices whose elements differ by less are the same: the platform never turns
-_SAME_ORIENTATION = 1e-6
+# an axis whose direction differs by less, in rad, never turns: a place that is off by a metre along it moves no reading
+# by more than 10 um
+_NEVER_TURNS_RAD = 1e-5
 # the mean of rotations and those that are far off it are found in so many rounds
 _ROUNDS_OF_MEAN = 5
 # ASSUME what is nearer to it is no gross error of a camera: least squares of all readings have the plain mean
@@ -128,9 +129,11 @@ def target_placement(sheet: Sheet) -> TargetPlacement | None:
         _refuse_places(sheet, left_mm, lost)
         notes += _lost_zero_notes(sheet, (zeros, far), left_mm) if lost else ()
     free = ~frames.known & ~frames.on_world
-    if registered and free.all() and np.ptp(poses.turn, axis=0).max() < _SAME_ORIENTATION:
-        # for a platform that never turns they are confounded with the frame's shift: their mean is set to the tool
-        place = place + np.asarray(sheet.mechanism.tool_mm) - np.unique(place, axis=0).mean(axis=0)
+    if registered and free.all():
+        # along an axis that never turns they are confounded with the frame's shift: their mean is set to the tool
+        axes, _ = axes_by_turning(poses.turn)
+        still = axes[:, np.ptp(poses.turn @ axes, axis=0).max(axis=0) < _NEVER_TURNS_RAD]
+        place = place + still @ still.T @ (np.asarray(sheet.mechanism.tool_mm) - np.unique(place, axis=0).mean(axis=0))
     turn = np.eye(3)
     if named and not set(frames.names) <= set(sheet.spec.targets):
         posed = poses, sheet.actuators(command) + zeros, command

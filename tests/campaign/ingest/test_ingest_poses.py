@@ -485,6 +485,23 @@ def test_a_wrong_height_in_the_robots_frame_is_named(tmp_path):
     np.testing.assert_allclose(np.array(place.groups(), dtype=float), (0.0, 0.0, off), atol=0.02)
 
 
+def test_places_along_an_axis_that_never_turns_are_next_to_the_tool(tmp_path):
+    """Their heights are confounded with that of the tracker, which had been off by some of the tracker's distance."""
+    robot, generator = _scara_of(325.0, 225.0), np.random.default_rng(5)
+    low, high = robot.drive_range.T
+    driven = low + (high - low) * generator.random((60, 4))
+    places = {"one": (40.0, 10.0, -35.0), "two": (-60.0, 25.0, 45.0)}
+    found = _taken(tmp_path, _seen_by_a_tracker(robot, driven, places, {}, generator), robot, frame="register")
+    columns = ["target_x_mm", "target_y_mm", "target_z_mm"]
+    place = found.measurements.groupby("target")[columns].first()
+    middle = np.mean([*places.values()], axis=0)[2] - robot.tool_mm[2]
+    for name, true in places.items():
+        np.testing.assert_allclose(place.loc[name], np.array(true) - (0.0, 0.0, middle), atol=0.05)
+    # z of the tool points down
+    shift = found.registration.translation
+    np.testing.assert_allclose(shift - (0.0, 0.0, middle), _FRAME.inv().apply(-_SHIFT), atol=0.5)
+
+
 @pytest.mark.parametrize("off", [(0.0, 0.0, 50.0), (15.0, -30.0, 40.0)])
 def test_a_wrong_place_on_a_platform_that_never_turns_is_named_beside_lost_zeros(off, tmp_path):
     """Zeros of three drives can do much of what a shift does: the shift, which does it all, is what to write."""
