@@ -30,6 +30,7 @@ from rrru.effects.library import HOLDS
 from rrru.effects.protocol import Coordinates
 from rrru.errors import FitError
 from rrru.estimation.noise_model import (
+    MIN_FREE_MEANS,
     MIN_FREE_NUMBERS,
     alike,
     fit_noise,
@@ -74,6 +75,12 @@ class InferenceResult:
     def held_out(self) -> HeldOut:
         """Predictions of left-out points."""
         return HeldOut(self.problem, self.evidence)
+
+    @property
+    def log_likelihood(self) -> float:
+        """Logarithm of the marginal likelihood of the readings under the noise, up to a constant of the readings."""
+        evidence = self.evidence.on_library()
+        return self.posterior.total - 3.0 * len(evidence) * float(np.log(evidence.noise.mean_mm))
 
     @property
     def lacks_fit(self) -> bool:
@@ -129,17 +136,18 @@ def with_world_scale(problem: DiagnosisProblem) -> DiagnosisProblem:
 
 
 def with_noise(
-    problem: DiagnosisProblem, linear: LinearizedProblem, stated_mm: float | None
+    problem: DiagnosisProblem, linear: LinearizedProblem, stated_mm: float | None, follow_means: bool = True
 ) -> tuple[DiagnosisProblem, str]:
     """The problem under the noise that a fit of all columns of a linearisation leaves, and the source of that noise.
 
     "fitted", see `rrru.estimation.noise_model`, or "repeats" where poses that were measured again say clearly less.
+    follow_means: whether functions of the discrepancy are among the columns, which can follow the means of all series.
     """
     repeats, complete = noise.repeat_noise(problem.measurements[problem.used]), problem.complete(problem.library)
     if 3 * complete.sum() < linear.base.shape[-1] + MIN_FREE_NUMBERS:
         complete[:] = True
     known = bool(stated_mm) or repeats[1] >= noise.ENOUGH_REPEATS
-    columns, prior_sd = _noise_columns(problem, linear, known)
+    columns, prior_sd = _noise_columns(problem, linear, known) if follow_means else _least_columns(problem, linear)
     # an effect is no noise where its inputs are unknown
     data, columns, series = linear.data[complete], columns[complete], problem.series[complete]
     discrepancy = spectrum if problem.along_paths else None
@@ -165,13 +173,30 @@ def _noise_columns(
     number needs to be left. Where it is not and the library explains everything, the residuals of the calibration are
     used.
     """
-    blocks = {key: columns for key, columns in linear.columns.items() if key[0] in problem.library}
-    searched = {key: blocks.pop(key) for key in [*blocks] if _is_searched(problem.library[key[0]].coordinates, key[1])}
+    blocks, searched = _blocks(problem, linear)
     for chosen, prior_sd in _fewer_blocks(problem, linear, blocks):
         columns = np.concatenate([linear.base, *chosen.values(), *linear.shape_columns.values()], axis=-1)
         if _leaves_enough(problem, linear, columns, prior_sd):
             return _with_significant(problem, linear, (columns, prior_sd), searched)
     return (columns if known else linear.base), None
+
+
+def _least_columns(problem: DiagnosisProblem, linear: LinearizedProblem) -> tuple[FloatArray, FloatArray | None]:
+    """As `_noise_columns`, of the last step of `_fewer_blocks`, but with rough functions."""
+    blocks, searched = _blocks(problem, linear)
+    steps = list(_fewer_blocks(problem, linear, blocks))
+    chosen, prior_sd = ([step for step in steps if step[1] is not None] or steps)[-1]
+    columns = np.concatenate([linear.base, *chosen.values(), *linear.shape_columns.values()], axis=-1)
+    return _with_significant(problem, linear, (columns, prior_sd), searched)
+
+
+def _blocks(
+    problem: DiagnosisProblem, linear: LinearizedProblem
+) -> tuple[dict[EffectKey, FloatArray], dict[EffectKey, FloatArray]]:
+    """Blocks of columns by (effect, shape), and apart from them those of shapes that were found in these data."""
+    blocks = {key: columns for key, columns in linear.columns.items() if key[0] in problem.library}
+    searched = {key: blocks.pop(key) for key in [*blocks] if _is_searched(problem.library[key[0]].coordinates, key[1])}
+    return blocks, searched
 
 
 def _leaves_enough(
@@ -282,6 +307,8 @@ def infer(problem: DiagnosisProblem, prior: Prior, stated: str = KNOWN) -> Infer
                 calibrated = calibrate(problem)
         problem = problem.standing(calibrated)
         inference = _rounds(problem, calibrated, prior, stated)
+        if stated != KNOWN:
+            inference = _with_hidden_offsets(inference, prior, problem.noise_mm if stated == STATED else None)
         found = inference.problem
         outliers = isolated(found.residual(inference.state), found.series, found.noise_mm, found.kind)
         if cleaning == OPTIONS.max_outlier_rounds or not outliers.any():
@@ -425,6 +452,25 @@ def _rounds(problem: DiagnosisProblem, calibrated: ModelState, prior: Prior, sta
         if not result.hypothesis.effects.isdisjoint(HOLDS.get(name, ())):
             result = _about_the_special_case(result, prior, name)
     return result
+
+
+def _with_hidden_offsets(inference: InferenceResult, prior: Prior, stated_mm: float | None) -> InferenceResult:
+    """The inference, or the one with offsets between the runs where these are more probable.
+
+    Functions of the time and of the place can follow the means of all series, as where each of eight paths was driven
+    once. A fit of all of them leaves offsets no room. Their size is then found with fewer functions, and the evidence
+    of both noises is compared, that of the offset as of a further parameter (Schwarz, Annals of Statistics 6, 1978).
+    """
+    problem, series = inference.problem, len(np.unique(inference.problem.series))
+    found_free = problem.noise is not None and len(problem.noise.offset_posterior) > 1
+    if inference.noise_from == REPEATS or found_free or 3.0 * series <= MIN_FREE_MEANS:
+        return inference
+    other, source = with_noise(problem, inference.evidence.linear, stated_mm, follow_means=False)
+    if source == REPEATS or other.noise is None or not other.noise.offset_probability > OPTIONS.min_offset_probability:
+        return inference
+    found = replace(_rounds(other, inference.calibrated, prior, KNOWN), noise_from=source)
+    cost = 0.5 * np.log(3.0 * series)
+    return found if found.log_likelihood - cost > inference.log_likelihood else inference
 
 
 def _about_the_special_case(inference: InferenceResult, prior: Prior, general: str) -> InferenceResult:

@@ -74,6 +74,8 @@ class DiagnosisOptions:
     discrepancy_white_share: float = 0.01
 
     # --- search over sets of effects and their evidence ---
+    # probability of offsets between the runs from which on they are an alternative to functions that can follow them
+    min_offset_probability: float = 0.5
     # prior probability that an effect which may act on each leg by itself acts on several and not on all; assumed
     prior_some_legs: float = 0.1
     # sets this far below the best are not worth an evaluation: e^-6 is 0.0025

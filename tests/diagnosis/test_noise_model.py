@@ -8,6 +8,7 @@ from scipy.fft import idct
 
 from rrru.campaign import measurements as rows
 from rrru.campaign.noise import along_runs
+from rrru.campaign.trajectories import Line
 from rrru.diagnosis.calibrate import calibrate
 from rrru.diagnosis.diagnose import MeasuredRobot, diagnose, with_wide_bounds
 from rrru.diagnosis.drive_spectra import with_orders
@@ -17,7 +18,18 @@ from rrru.diagnosis.settings import GapSettings
 from rrru.diagnosis.whitened import spectrum
 from rrru.estimation.noise_model import NoiseModel, fit_noise, half_waves, high_frequency_noises, lengths
 from tests.diagnosis import arms
-from tests.diagnosis.campaigns import MASSES, NOISE_MM, ROBOT, diagnosed, measure, strong
+from tests.diagnosis.campaigns import (
+    EFFECTS,
+    FORWARD,
+    MASSES,
+    NOISE_MM,
+    ROBOT,
+    SPIRAL,
+    diagnosed,
+    measure,
+    plan_of,
+    strong,
+)
 
 _RUNS, _POINTS = 12, 26
 _SERIES = np.repeat(np.arange(_RUNS), _POINTS)
@@ -189,6 +201,33 @@ def test_noise_that_is_not_as_stated_is_no_cause(name, effect):
     assert verdict["effects"] == (effect or "none")
     contradicted = name in ("axes", "scatter")
     assert ("noise stated" in verdict["notes"]) == contradicted
+
+
+# seven lines and the spiral, each driven once: functions of the time and the place can follow all eight means
+_ONCE = plan_of(
+    (FORWARD,),
+    (
+        *(Line(f"line_{k}", (-600.0, y, 650.0), (0.0, y, 650.0), 16) for k, y in enumerate(range(-165, 166, 55))),
+        SPIRAL,
+    ),
+)
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("effect", [None, "base_drift"])
+def test_offsets_of_paths_that_were_driven_once_are_no_drift(effect, seed):
+    frame = measure((strong(effect, 2.0),) if effect else (), noise_mm=0.0, plan=_ONCE)
+    noise = _noise(np.random.default_rng(seed), frame["run"].to_numpy(), np.full(3, NOISE_MM), 0.0, 0.5 * NOISE_MM)
+    frame = frame.assign(**rows.vector_columns("measured", rows.measured(frame) + noise))
+    assert diagnosed(frame).verdict["effects"] == (effect or "none")
+
+
+def test_a_drift_that_the_library_lacks_is_no_offset_of_runs():
+    """Paths that were driven once, without a drift of the base in the library: offsets explain it less well."""
+    lacking = tuple(EFFECTS.keys() - {"base_drift", "thermal_growth", "frame_misregistration"})
+    frame = measure((strong("base_drift", 3.0),), plan=_ONCE)
+    verdict = diagnosed(frame, settings=GapSettings(lacking, draws=50)).verdict
+    assert "unexplained" in verdict["effects"].split("+")
 
 
 def test_a_noise_that_is_known_is_not_fitted():
