@@ -13,6 +13,7 @@ import sys
 import textwrap
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -38,6 +39,15 @@ class _Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         """End with a message that says where the arguments are explained."""
         self.exit(WRONG, f"error: {message}; see `{self.prog} --help`\n")
+
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """As of argparse, but arguments that are not known end with the command's own help, and the nearest option."""
+        found, unknown = super().parse_known_args(args, namespace)
+        if unknown:
+            nearest = get_close_matches(unknown[0].split("=")[0], self._option_string_actions, n=1)
+            meant = f"; did you mean {nearest[0]}?" if nearest else ""
+            self.error(f"unknown arguments: {' '.join(unknown)}{meant}")
+        return found, unknown
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -194,6 +194,18 @@ def test_a_wrong_option_is_one_line(capsys):
     assert "argument --noise: 'abc' is no number; allowed: a number such as 0.03; see `rrru diagnose --help`" in message
 
 
+@pytest.mark.parametrize(
+    ("given", "meant"),
+    [("--output=there", "--output=there; did you mean --out?"), ("--noize=0.03", "did you mean --noise?"), ("b", "b")],
+)
+def test_an_unknown_argument_is_named_with_the_nearest_one(given, meant, capsys):
+    with pytest.raises(SystemExit) as ended:
+        cli.main(["diagnose", "a.csv", given])
+    message = capsys.readouterr().err
+    assert ended.value.code == cli.WRONG and f"unknown arguments: {given.split()[0]}" in message
+    assert f"{meant}; see `rrru diagnose --help`" in message
+
+
 def test_a_folder_that_cannot_be_written_is_found_before_anything_is_computed(tmp_path, capsys, monkeypatch):
     (tmp_path / "file").write_text("")
     monkeypatch.setattr(api, "diagnose", lambda *_, **__: pytest.fail("computed"))
