@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import takewhile
 
 import numpy as np
 
@@ -54,7 +55,9 @@ def open_numbers(config: MeasurementConfig) -> tuple[Candidate, ...]:
 def candidates_of(legs: Legs, parts: Parts, config: MeasurementConfig | None = None) -> tuple[Candidate, ...]:
     """All Candidates of Legs, drives first, then lengths along links, other shifts, angles, tool and world.
 
-    Those of the MeasurementConfig come before the others of tool and world.
+    Those of the MeasurementConfig come before the others of tool and world. Where places of reflectors are unknown they
+    also come before the frames behind an arm's last joint: nothing is known about a place, and a tool on its flange is
+    off by less than a place that the nominal robot's poses give.
     """
     config = config or MeasurementConfig()
     drives = [
@@ -81,8 +84,19 @@ def candidates_of(legs: Legs, parts: Parts, config: MeasurementConfig | None = N
     tool = () if legs.end_effectors else range(6 if config.turned or config.reflectors else 3)
     outside = [(TOOL, k) for k in tool] + [(WORLD, k) for k in range(6)]
     numbers = [_at(*place) for place in (*lengths, *shifts, *turns) if place not in taken]
-    every = [*drives, *numbers, *open_numbers(config), *(_at(*place) for place in outside)]
+    behind = _behind_the_last_joint(legs) if config.fitted else set()
+    last = [one for one in numbers if behind.issuperset(one.twists)]
+    numbers = [one for one in numbers if not behind.issuperset(one.twists)]
+    every = [*drives, *numbers, *open_numbers(config), *last, *(_at(*place) for place in outside)]
     return tuple({candidate.name: candidate for candidate in every}.values())
+
+
+def _behind_the_last_joint(legs: Legs) -> set[str]:
+    """Names of the fixed frames behind the last moving joint of each arm, none of another robot."""
+    if not legs.arm_joints:
+        return set()
+    ends = (takewhile(lambda joint: joint.kind == "fixed", reversed(leg.joints)) for leg in legs.legs)
+    return {joint.name for end in ends for joint in end}
 
 
 def _at(site: str, component: int) -> Candidate:

@@ -1,9 +1,12 @@
 """Base parameters: what a campaign's calibration holds of a robot whose every part has errors."""
 
 from dataclasses import replace
+from xml.etree import ElementTree
 
 import numpy as np
+import pandas as pd
 import pytest
+from scipy.spatial.transform import Rotation
 
 import rrru
 from rrru.studies.blind_validation.sentences.draws import draw
@@ -32,3 +35,55 @@ def test_all_errors_of_an_own_robot_of_unknown_frame_are_calibrated(number, tmp_
     campaign.config["calibration"]["bounds"] = {"angle_rad": 0.3, "length_mm": 50.0}
     (fit, *_) = rrru.calibrate(campaign).fits.values()
     assert 0.8 * NOISE_MM < fit.noise_mm < 1.5e-3
+
+
+def _chain(path):
+    """[(shift in mm (3,), turn (3, 3), axis (3,) or None)] of a URDF's joints from the base to the last link."""
+    chain = []
+    for joint in ElementTree.parse(path).getroot().findall("joint"):
+        place = joint.find("origin")
+        shift, rpy = (np.array((place.get(key) or "0 0 0").split(), dtype=float) for key in ("xyz", "rpy"))
+        axis = joint.find("axis")
+        turn = Rotation.from_euler("xyz", rpy).as_matrix()
+        chain.append((1e3 * shift, turn, None if axis is None else np.array(axis.get("xyz").split(), dtype=float)))
+    return chain
+
+
+def _tool(chain, errors, drives):
+    """Position (3,) and orientation (3, 3) of the last link at drive values (K,) with twists (joints, 6) as errors."""
+    position, turn, values = np.zeros(3), np.eye(3), iter(drives)
+    for (shift, seat, axis), error in zip(chain, errors, strict=True):
+        position = position + turn @ (shift + error[:3])
+        turn = turn @ seat @ Rotation.from_rotvec(error[3:]).as_matrix()
+        if axis is not None:
+            turn = turn @ Rotation.from_rotvec(next(values) * axis).as_matrix()
+    return position, turn
+
+
+@pytest.mark.parametrize("names", [("near",), ("near", "far")])
+def test_unknown_places_of_reflectors_leave_the_tool_where_the_file_has_it(names):
+    """An arm with errors of all joints and of no frame behind the last one, read in an unknown frame.
+
+    What turns about the line through two reflectors moves neither of them. Fitted to places that the nominal robot's
+    poses gave, the tool was off by some mrad. The distance of the places from the last axis is what it is.
+    """
+    file, generator = "data/models/arm6.urdf", np.random.default_rng(12)
+    chain, robot = _chain(file), rrru.load_robot(file)
+    moving = np.array([axis is not None for *_, axis in chain])
+    errors = moving[:, None] * generator.normal(0.0, 1.0, (len(chain), 6)) * np.repeat([0.3, 6e-4], 3)
+    places = {name: np.array(place) for name, place in (("near", (60.0, 25.0, 15.0)), ("far", (-55.0, 30.0, 45.0)))}
+    turn, rows = Rotation.from_euler("xyz", [0.02, -0.01, 2.1]), []
+    for drives in np.array([0.2, -0.4, 0.6, 0.3, 0.5, 0.1]) + generator.uniform(-0.8, 0.8, (60, 6)):
+        position, oriented = _tool(chain, errors, drives)
+        for name in names:
+            seen = turn.apply(position + oriented @ places[name]) + np.array([2500.0, 900.0, -150.0])
+            rows.append([*drives, name, *seen + generator.normal(0.0, 0.005, 3)])
+    columns = [*robot.drives, "target", "measured_x_mm", "measured_y_mm", "measured_z_mm"]
+    table = pd.DataFrame(rows, columns=columns)
+    campaign = rrru.read_campaign(table, robot, noise_mm=0.005, frame="register", motion="stop_and_go")
+    found = rrru.calibrate(campaign).parameters.set_index("parameter")["value"]
+    assert not [name for name in found.index if name.startswith(("arm_platform", "tool"))]
+    for name in names:
+        first = campaign.measurements.query("target == @name").iloc[0]
+        place = [first[f"target_{axis}_mm"] + found.get(f"reflector_{name}_{axis}", 0.0) for axis in "xyz"]
+        assert np.hypot(*place[:2]) == pytest.approx(np.hypot(*places[name][:2]), abs=0.02)
