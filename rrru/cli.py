@@ -331,7 +331,7 @@ def _print_answer(campaign: Any, page: Path, as_options: bool) -> None:
         print(_dim(_wrapped(f"note: {note}")))
     if untested:
         print(_dim(_wrapped(f"note: not tested, for reasons that the page has: {', '.join(untested)}")))
-    if as_options and (keys := options_in("; ".join(notes))):
+    if as_options and (keys := options_in("\n".join(notes))):
         print(_dim(_wrapped(f"keys that the notes name, as options of the command: {' '.join(keys)}")))
     print()
     for label, path in (("page", page), ("answer as JSON", page.with_name("verdict.json")), ("tables", page.parent)):

@@ -135,7 +135,8 @@ def ends(urdf: Urdf, base: str | None, tip: str | None, file: Path) -> tuple[str
         return base, tip
     leaves = [link for link in _behind(urdf, base) if not urdf.children[link]]
     if len(leaves) != 1:
-        raise ConfigError(f"{file}: no tip is given; allowed: one of {', '.join(leaves)}")
+        what = "state as `tip` (--tip) the link that carries the measured point"
+        raise ConfigError(f"{file}: no tip is given; allowed: one of {', '.join(leaves)}; {what}")
     return base, leaves[0]
 
 

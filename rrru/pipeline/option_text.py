@@ -50,14 +50,27 @@ def as_option(key: str, value: Any) -> str:
 
 
 def options_in(message: str) -> list[str]:
-    """Options for the keys that a message says to write, in their order.
+    """Options for the keys that a message says to write, in their order; alternatives of a line in one text.
 
     >>> options_in("far off; allowed: frame: register turns another frame in")
     ['--frame register']
+    >>> options_in("allowed: unit: m and drive_unit: mm or unit: inch, which leaves 0.2 mm")
+    ['--set unit=m --set drive_unit=mm or --set unit=inch']
     """
-    stated = [as_option(key, value) for key, value in dict.fromkeys(_STATED.findall(message))]
-    tools = dict.fromkeys(_TOOL.findall(message))
-    return [*stated, *(f"--tool {place.replace(' ', '')}" for place in tools)]
+    result: dict[str, None] = {}
+    for line in message.splitlines():
+        alternatives: list[str] = []
+        end = 0
+        for found in sorted((*_STATED.finditer(line), *_TOOL.finditer(line)), key=lambda one: one.start()):
+            option = as_option(*found.groups()) if found.re is _STATED else f"--tool {found[1].replace(' ', '')}"
+            if not alternatives or " or " in line[end : found.start()]:
+                alternatives.append(option)
+            elif option not in alternatives[-1]:
+                alternatives[-1] += f" {option}"
+            end = found.end()
+        if alternatives:
+            result[" or ".join(dict.fromkeys(alternatives))] = None
+    return [*result]
 
 
 def as_command(section: Mapping[str, Any], entry: Mapping[str, Any]) -> str:

@@ -28,7 +28,11 @@ def _refused(pattern, call, *arguments, **options):
 @pytest.mark.parametrize(
     ("joints", "options", "pattern"),
     [
-        (TREE + joint_of("j3", "fixed", "one", "three"), {}, "no tip is given; allowed: one of two, three"),
+        (
+            TREE + joint_of("j3", "fixed", "one", "three"),
+            {},
+            r"no tip is given; allowed: one of two, three; state as `tip` \(--tip\)",
+        ),
         (
             TREE + joint_of("j3", "fixed", "two", "three"),
             {"tip": "hand"},

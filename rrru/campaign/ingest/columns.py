@@ -28,6 +28,9 @@ _OPTIONAL = ("target", "name", "temperature_c", *(name for group in _GROUPS for 
 _TEXT = ("trajectory", "target")
 _BEFORE_DRIVES, _AFTER_DRIVES = ("run", "point", "time_s"), ("speed_mm_s", "payload_kg")
 
+# words in the name of a column of distances: a draw-wire encoder, a ballbar, a tape
+_DISTANCES = {"distance", "distances", "dist", "length", "ballbar", "wire", "abstand", "distanz", "laenge", "länge"}
+
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 _DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+([eE][+-]?\d+)?", re.ASCII)
 # larger numbers are no measurements, but damaged cells or markers of missing values
@@ -91,7 +94,14 @@ def resolve(
     spare = {ours: theirs for theirs, ours in meant.items() if ours in drives and theirs in extra}
     only_drives = bool(set(drives) & {*found, *spare}) and not set(COMMAND) & set(found)
     listed = ", ".join(name for name in names if name not in cells.added)
+    alone = distances_alone(found, extra)
+    if alone:
+        points = "of each stop from three or more fixed points (multilateration), and write them as measured_x_mm .."
+        allowed = f"all three coordinates of each reading: compute them from the distances {points}"
+        problems.add("distances", column=", ".join(alone), value="distances, which are not read", allowed=allowed)
     for ours, theirs in wanted.items():
+        if alone and ours in MEASURED:
+            continue
         if ours not in found and ((ours in REQUIRED and not (only_drives and ours in COMMAND)) or ours in spec.columns):
             allowed = f"a column {theirs}{_advice(ours, _nearest(theirs, extra))}; the file has {listed}"
             problems.add("missing column", column=theirs, value="no such column", allowed=allowed)
@@ -119,6 +129,13 @@ def resolve(
             allowed = f"extra_columns: ignore, which leaves it out{advice}; known: {', '.join(wanted)}"
             problems.add("unknown column", column=shown, value="an undeclared column", allowed=allowed)
     return found, extra
+
+
+def distances_alone(found: Mapping[str, str], extra: Iterable[str]) -> list[str]:
+    """Names of columns that hold distances, of a file's undeclared ones, where no measured coordinate was found."""
+    if set(MEASURED) & set(found):
+        return []
+    return [name for name in extra if _DISTANCES & set(re.split(r"[\W_]+", name.casefold()))]
 
 
 def convert(

@@ -95,7 +95,12 @@ def find_gross_error(
             # the remainder is no mistake
             break
     search.settle()
-    if named := search.named:
+    named = search.named
+    if spec.frame == "robot":
+        # of mistakes that explain the file alike, those that explain it where the instrument's frame is the robot's
+        limit_mm = EXPLAINED_SHARE * robot.size_mm
+        named = [one for one in named if file.off_in_robot_frame(one.mistakes) <= limit_mm] or named
+    if named:
         words = " or ".join(advice(file, one) for one in named)
         # of hypotheses that differ by rounding, as on a symmetric robot, rounding must not choose
         concerned = next((one.mistakes for one in named if not one.mistakes.of_readings), named[0].mistakes)

@@ -1,6 +1,7 @@
 """Orientations in a file: rotation vectors, or quaternions that are turned into them. Angles in rad."""
 
 from collections.abc import Mapping, Sequence
+from itertools import permutations
 
 import numpy as np
 import pandas as pd
@@ -51,7 +52,7 @@ def _from_quaternions(
 
 
 def other_readings(turns: np.ndarray, found: Mapping[str, str]) -> dict[str, np.ndarray]:
-    """What orientations (n, 3, 3) may be instead, (n, 3, 3), by what to write or to mend.
+    """What orientations (n, 3, 3) may be instead, (n, 3, 3), by what to write or to mend: inverse, or other columns.
 
     found: the file's column by ours, where orientations came as quaternions with those of their parts.
     """
@@ -59,13 +60,13 @@ def other_readings(turns: np.ndarray, found: Mapping[str, str]) -> dict[str, np.
 
     made = Rotation.from_matrix(turns)
     result = {"the orientation of what is measured in the instrument's frame, not its inverse": made.inv()}
-    names = QUATERNIONS["measured"]
-    if set(names) <= set(found):
-        x, y, z, w = (found[name] for name in names)
-        # the file's first column is the scalar part, the last one its z
-        first = dict(zip(names, (y, z, w, x), strict=True))
-        listed = ", ".join(f"{ours}: {theirs}" for ours, theirs in first.items())
-        result[f"columns: {{{listed}}}"] = Rotation.from_quat(made.as_quat()[:, [1, 2, 3, 0]])
+    quaternion = set(QUATERNIONS["measured"]) <= set(found)
+    names = QUATERNIONS["measured"] if quaternion else TURNS["measured"]
+    parts, rotation = (made.as_quat(), Rotation.from_quat) if quaternion else (made.as_rotvec(), Rotation.from_rotvec)
+    # columns in another order, as quaternions whose first column is the scalar part
+    for order in list(permutations(range(len(names))))[1:]:
+        listed = ", ".join(f"{name}: {found.get(names[k], names[k])}" for name, k in zip(names, order, strict=True))
+        result[f"columns: {{{listed}}}"] = rotation(parts[:, order])
     return {key: rotation.as_matrix() for key, rotation in result.items()}
 
 

@@ -89,6 +89,10 @@ class Sheet:
     def _column(self, ours: str | Sequence[str] | None) -> str | None:
         """The file's names of columns of ours."""
         ours = (ours,) if isinstance(ours, str) else ours
+        for name, turns in TURNS.items():
+            # rotation vectors that were made from quaternions are in no file
+            if ours == turns and set(QUATERNIONS[name]) <= set(self.found):
+                ours = QUATERNIONS[name]
         return ", ".join(self.found.get(name, name) for name in ours) if ours else None
 
 

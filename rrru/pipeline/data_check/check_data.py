@@ -12,7 +12,7 @@ import yaml
 
 from rrru.campaign import measurements as rows
 from rrru.campaign.ingest.cells import Cells
-from rrru.campaign.ingest.columns import REQUIRED, resolve
+from rrru.campaign.ingest.columns import REQUIRED, distances_alone, resolve
 from rrru.campaign.ingest.guess import axis_triples
 from rrru.campaign.ingest.problems import Problems
 from rrru.campaign.ingest.sheet import COMMAND, MEASURED, position_text
@@ -164,7 +164,7 @@ def _used(section: Mapping[str, Any], cells: Cells, mechanism: Robot) -> Iterato
     missing = [ours for ours in REQUIRED if ours not in found and not (drives and ours.startswith("command"))]
     if missing:
         yield f"missing, and needed: {', '.join(missing)}"
-    if set(MEASURED) <= set(missing):
+    if set(MEASURED) <= set(missing) and not distances_alone(found, left):
         for axes in axis_triples(left):
             pairs = ", ".join(f"measured_{axis}_mm: '{axes[axis]}'" for axis in "xyz")
             yield f'measured? if {axes["x"]!r} .. are the measured positions: --set "columns={{{pairs}}}"'

@@ -214,6 +214,15 @@ def _scalar_first(table):
     )
 
 
+def _exchanged(table):
+    return table.rename(columns={"measured_qx": "measured_qy", "measured_qy": "measured_qx"})
+
+
+def _turned_axes(table):
+    vector = Rotation.from_quat(table[_QUATERNION].to_numpy()).as_rotvec()
+    return table.drop(columns=_QUATERNION).assign(**{f"measured_r{x}_rad": vector[:, k] for k, x in enumerate("yzx")})
+
+
 def _inverse(table):
     return table.assign(measured_qw=-table["measured_qw"])
 
@@ -228,6 +237,8 @@ def _halved(table):
     ("change", "advice"),
     [
         (_scalar_first, r"columns: \{measured_qx: measured_qy, measured_qy: measured_qz, measured_qz: measured_qw"),
+        (_exchanged, r"columns: \{measured_qx: measured_qy, measured_qy: measured_qx, measured_qz: measured_qz"),
+        (_turned_axes, r"columns: \{measured_rx_rad: measured_ry_rad, measured_ry_rad: measured_rz_rad"),
         (_inverse, "not its inverse leaves"),
         (_halved, "at most 0.1 rad; check unit, sequence and order of their columns$"),
     ],
@@ -237,8 +248,11 @@ def test_orientations_that_turn_otherwise_than_the_platform_are_refused(
 ):
     """A noise of some degrees was found in their place, and a cause was named with 0.99."""
     table, options = change(_file(arm, driven, registered=registered)), {} if registered else {"targets": {}}
-    with pytest.raises(IngestError, match=f"in the median from those of the platform times a fixed rotation.*{advice}"):
+    stated = {name for name in table if name.startswith(("measured_q", "measured_r"))}
+    far = "in the median from those of the platform times a fixed rotation"
+    with pytest.raises(IngestError, match=f"{far}.*{advice}") as refused:
         _taken(tmp_path, table, arm, frame="register" if registered else "robot", **options)
+    assert set(refused.value.problems[0]["column"].split(", ")) == stated
 
 
 def test_joints_alone_do_for_a_parallel_robot(tmp_path):

@@ -222,6 +222,14 @@ ROWS = {
         "no such column",
         "the file has run, trajectory",
     ),
+    "distances alone": (
+        FIELD.drop(columns=["measured_x_mm", "measured_y_mm", "measured_z_mm"]).assign(**{"Distance [mm]": 812.5}),
+        {},
+        None,
+        "Distance [mm]",
+        "distances, which are not read",
+        "from three or more fixed points",
+    ),
     "a misspelt column": (
         TEXT.replace("measured_x", "mesured_x"),
         {},
