@@ -43,6 +43,8 @@ _BUDGET_MM = 16.0
 _TICKS, _FEW_TICKS = 5, 3
 # legs are named for effects at least this probable; numbers stand inside bars longer than this
 _NAMED_FROM, _INSIDE_FROM = 0.05, 0.6
+# letters that a bar of probability 1 holds; next to a shorter one the page's margin holds as many as half of it
+_BAR_LETTERS = 20
 # more runs than this have no room for their trajectories' names, and for all their numbers
 _NAMED_RUNS, _NUMBERED_RUNS = 9, 30
 # width of the 95 % interval of a share from which the headline has no number, as in rrru.diagnosis.options
@@ -243,10 +245,15 @@ def _causes(axes: Axes, causes: pd.DataFrame, verdict: pd.Series, words: _DriveN
     axes.barh(rows[alike], value[alike], height=0.72, **hatched)
     for row, named, cause in zip(rows, chosen, causes.to_dict("records"), strict=True):
         probability, legs = cause["probability"], _leg(cause["legs"], **words)
-        text = _probability(probability) + (f", {legs}" if legs and probability >= _NAMED_FROM else "")
-        if cause["decision"] == _NOT_TESTED:
-            probability, text = 0.0, _NOT_TESTED
         inside = probability >= _INSIDE_FROM
+        room = _BAR_LETTERS * (probability if inside else 1.5 - probability)
+        text = _probability(probability)
+        if probability >= _NAMED_FROM:
+            several = cause["legs"].count(" and ") + 1
+            places = (legs, f"{several} {words['noun']}s" if several > 1 else "")
+            text = next((f"{text}, {place}" for place in places if place and len(f"{text}, {place}") <= room), text)
+        if cause["decision"] == _NOT_TESTED:
+            probability, text, inside = 0.0, _NOT_TESTED, False
         look: style.Look = {"ha": "right" if inside else "left", "va": "center", "fontsize": 7.0, "in_layout": False}
         colour = "white" if inside and named and cause["decision"] != "group" else "black"
         axes.text(probability + (-0.015 if inside else 0.015), row, text, color=colour, **look)

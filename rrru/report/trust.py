@@ -76,7 +76,11 @@ def _judged(row: Mapping[str, Any], tied: Sequence[str]) -> str:
         return "doubtful: something acts that no effect explains"
     if tied:
         return f"use only together with {', '.join(tied)}"
-    return "use: differs from the drawing" if abs(row["value"]) > half else "use: as drawn, within its error"
+    # the interval of the model with the effects, where there is one: without these it holds what they make
+    low, high = row["value"] - half, row["value"] + half
+    if row["high_95"] > row["low_95"]:
+        low, high = row["low_95"], row["high_95"]
+    return "use: differs from the drawing" if low > 0.0 or high < 0.0 else "use: as drawn, within its error"
 
 
 def _tied(row: Mapping[str, Any], correlations: pd.DataFrame) -> list[str]:

@@ -129,6 +129,24 @@ def test_causes_are_ordered_and_the_verdict_s_are_in_colour(frames):
     assert texts["thermal growth"] == "not tested" and texts["unexplained"] == "0.04"
 
 
+@pytest.mark.parametrize("probability", [1.0, 0.8, 0.62, 0.55, 0.4, 0.1])
+@pytest.mark.parametrize("legs", ["1", "1 and 2", "1 and 2 and 3", "each", "same"])
+def test_long_names_of_joints_stay_in_their_bar_and_on_the_page(probability, legs, frames):
+    """Names as in files of common arms; the page's sentences have those for which the bar has no room."""
+    causes = frames["gap_attribute"].copy()
+    causes.loc[causes["effect"] == "link_flexure", ["probability", "legs"]] = probability, legs
+    tables = {table: frames[table] for table in FIGURES["gap"][1]} | {"gap_attribute": causes}
+    joints = ("shoulder_lift_joint", "panda_joint2", "wrist_joint")
+    figure = FIGURES["gap"][0](tables, {**synthetic.OPTIONS, "drives": joints, "drive_noun": "joint"})
+    figure.draw_without_rendering()
+    axes = panel(figure, "(b)")
+    for text in axes.texts:
+        box = text.get_window_extent()
+        assert box.x0 >= axes.bbox.x0 and box.x1 <= figure.bbox.x1
+    widest = [text for text in written(axes) if "joint" in text]
+    assert legs != "1 and 2" or probability < 1.0 or widest[0] == ">0.99, 2 joints"
+
+
 def test_the_shrink_is_the_last_held_out_step_of_every_trajectory(frames):
     axes = panel(draw("gap", frames), "(c)")
     rows = frames["gap_shrink"].query("kind == 'held_out'")

@@ -51,6 +51,13 @@ def test_what_the_effects_change_by_more_than_twice_the_error_is_biased(moved, w
     assert judgements(*tables(moved=moved))["sure"].startswith(word)
 
 
+def test_a_number_that_only_the_model_with_the_effects_tells_from_the_drawing_differs_from_it():
+    made = tables()
+    drawn = made[3]["parameter"] == "drawn"
+    made[3].loc[drawn, ["value", "low_95", "high_95"]] = 0.004, 0.003, 0.005
+    assert judgements(*made)["drawn"] == "use: differs from the drawing"
+
+
 def test_every_number_has_its_95_percent_interval():
     said = trust(*tables()).set_index("parameter")
     assert said.loc["sure", "value"] == "0.100 mm (95 %: 0.080 to 0.120)"
