@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import takewhile
 
 import numpy as np
 
@@ -56,8 +55,8 @@ def candidates_of(legs: Legs, parts: Parts, config: MeasurementConfig | None = N
     """All Candidates of Legs, drives first, then lengths along links, other shifts, angles, tool and world.
 
     Those of the MeasurementConfig come before the others of tool and world. Where places of reflectors are unknown they
-    also come before the frames behind an arm's last joint: nothing is known about a place, and a tool on its flange is
-    off by less than a place that the nominal robot's poses give.
+    also come before what does the same as an error of them all: nothing is known about a place, and a tool on its
+    flange is off by less than a place that the nominal robot's poses give.
     """
     config = config or MeasurementConfig()
     drives = [
@@ -84,19 +83,33 @@ def candidates_of(legs: Legs, parts: Parts, config: MeasurementConfig | None = N
     tool = () if legs.end_effectors else range(6 if config.turned or config.reflectors else 3)
     outside = [(TOOL, k) for k in tool] + [(WORLD, k) for k in range(6)]
     numbers = [_at(*place) for place in (*lengths, *shifts, *turns) if place not in taken]
-    behind = _behind_the_last_joint(legs) if config.fitted else set()
-    last = [one for one in numbers if behind.issuperset(one.twists)]
-    numbers = [one for one in numbers if not behind.issuperset(one.twists)]
-    every = [*drives, *numbers, *open_numbers(config), *last, *(_at(*place) for place in outside)]
+    every = [*drives, *numbers]
+    carries = _carry_the_tool(legs, every) if config.fitted else [False] * len(every)
+    others, last = ([one for one, carry in zip(every, carries, strict=True) if carry is late] for late in (False, True))
+    every = [*others, *open_numbers(config), *last, *(_at(*place) for place in outside)]
     return tuple({candidate.name: candidate for candidate in every}.values())
 
 
-def _behind_the_last_joint(legs: Legs) -> set[str]:
-    """Names of the fixed frames behind the last moving joint of each arm, none of another robot."""
+def _carry_the_tool(legs: Legs, candidates: Sequence[Candidate]) -> list[bool]:
+    """Whether Candidates move the tool of an arm on its last link: frames behind its last moving joint, and this
+    joint's errors along and about its own axis.
+    """
     if not legs.arm_joints:
-        return set()
-    ends = (takewhile(lambda joint: joint.kind == "fixed", reversed(leg.joints)) for leg in legs.legs)
-    return {joint.name for end in ends for joint in end}
+        return [False] * len(candidates)
+    behind: set[str] = set()
+    own = {}
+    for leg in legs.legs:
+        moving = max(number for number, joint in enumerate(leg.joints) if joint.kind != "fixed")
+        behind |= {joint.name for joint in leg.joints[moving + 1 :]}
+        own[leg.joints[moving].name] = np.tile(leg.joints[moving].axis, 2)
+
+    def carries(one: Candidate) -> bool:
+        return all(
+            site in behind or (site in own and np.allclose(np.abs(twist @ own[site]), np.linalg.norm(twist)))
+            for site, twist in one.twists.items()
+        )
+
+    return [carries(one) for one in candidates]
 
 
 def _at(site: str, component: int) -> Candidate:

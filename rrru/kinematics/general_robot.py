@@ -121,7 +121,7 @@ class GeneralRobot(Robot):
         """The Candidates that the set is chosen from."""
         if self.parameter_set == "full":
             return self.candidates
-        drives = self.candidates[: len(self.parts.drives)] if self.parameter_set == "zero" else ()
+        drives = [one for one in self.candidates if one.leg] if self.parameter_set == "zero" else ()
         return (*drives, *open_numbers(self.measurement_config))
 
     def _workspace(self) -> tuple[FloatArray, FloatArray]:

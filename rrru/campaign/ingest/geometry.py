@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 
 from rrru.campaign import measurements as rows
+from rrru.campaign.ingest.gross_file import ORDINARY_SHARE
 from rrru.campaign.ingest.sheet import AXES, COMMAND, MEASURED, TURNS, Sheet, position_text
 from rrru.campaign.ingest.spec import MM
 from rrru.kinematics.robot import Robot
@@ -71,7 +72,8 @@ def check_sizes(sheet: Sheet, offset_mm: np.ndarray | float = 0.0) -> bool:
     """Note measured positions in another unit than the commanded ones; True where both have the same unit.
 
     Their spreads are compared, which are the same in every frame. offset_mm (n, 3): of what is measured from the tool.
-    A reflector without a stated place on a platform that turns may move far less or more than the tool.
+    A reflector without a stated place on a platform that turns may move far less or more than the tool. Spreads as
+    small as a robot's errors, of a tool that stays at one place while its drives move, say nothing.
     """
     low, high = (0.5, 2.0) if _place_stated(sheet) else (0.05, 20.0)
     known = (sheet.frame[[*COMMAND, *MEASURED]].notna()).all(axis=1).to_numpy()
@@ -79,7 +81,8 @@ def check_sizes(sheet: Sheet, offset_mm: np.ndarray | float = 0.0) -> bool:
         return False
     command = _spread((rows.command(sheet.frame) + offset_mm)[known])
     measured = _spread(rows.measured(sheet.frame)[known])
-    if command == 0.0 or low <= measured / command <= high:
+    stays = max(command, measured) <= ORDINARY_SHARE * sheet.mechanism.size_mm
+    if stays or command == 0.0 or low <= measured / command <= high:
         return True
     ratio, seems = measured / command, ""
     if not set(COMMAND) <= set(sheet.found):

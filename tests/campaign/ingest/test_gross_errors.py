@@ -147,28 +147,40 @@ def test_one_wrong_place_of_three_is_named_and_the_others_stay(kind):
         np.testing.assert_allclose([float(number) for number in text.split(",")], place, atol=1.0)
 
 
-def test_a_mistake_that_only_a_turned_instrument_hides_is_not_named_in_the_robot_s_frame():
-    """A spindle that visits three places on a rotary table, which are in one plane: where the instrument may stand
-    anywhere, a table that turns in the opposite sense and a slide that moves so give the same readings.
-    """
+def _rotary_table(places):
+    """A machine whose spindle visits places (k, 3) on its rotary table, and its file: 15 angles of the table each."""
     turn, slide = {"range_deg": [-170, 170]}, {"sliding": True, "range_mm": [-300, 300]}
     table = [turn | {"name": "c"}, {"rpy_deg": [0, 90, 0]}, slide | {"alpha_deg": -90, "name": "x"}]
     slides = [slide | {"theta_deg": -90, "alpha_deg": -90, "name": "y"}, slide | {"name": "z"}]
     robot = from_dh([*table, *slides], name="mill")
-    places = np.array([[120.0, 0.0, 60.0], [-80.0, 90.0, 60.0], [0.0, -120.0, 140.0]])
-    drives = np.zeros((45, 4))
-    drives[:, 0] = np.tile(np.linspace(-2.4, 2.4, 15), 3)
+    drives = np.zeros((15 * len(places), 4))
+    drives[:, 0] = np.tile(np.linspace(-2.4, 2.4, 15), len(places))
     home = robot.forward(drives)
-    slides = np.stack([robot.forward(drives + np.eye(4)[k]) - home for k in (1, 2, 3)], axis=2)
-    drives[:, 1:] = np.linalg.solve(slides, (np.repeat(places, 15, axis=0) - home)[..., None])[..., 0]
-    frame = pd.DataFrame(drives * [-1.0, 1.0, 1.0, 1.0], columns=robot.parts.columns).assign(trajectory="poses")
-    frame = frame.assign(**rows.vector_columns("measured", robot.forward(drives)))
-    named = {}
+    moved = np.stack([robot.forward(drives + np.eye(4)[k]) - home for k in (1, 2, 3)], axis=2)
+    drives[:, 1:] = np.linalg.solve(moved, (np.repeat(places, 15, axis=0) - home)[..., None])[..., 0]
+    frame = pd.DataFrame(drives, columns=robot.parts.columns).assign(trajectory="poses")
+    return robot, frame.assign(**rows.vector_columns("measured", robot.forward(drives)))
+
+
+def test_a_mistake_that_only_a_turned_instrument_hides_is_not_named_in_the_robot_s_frame():
+    """Of a spindle that visits three places on a rotary table, which are in one plane: where the instrument may stand
+    anywhere, a table that turns in the opposite sense and a slide that moves so give the same readings.
+    """
+    robot, frame = _rotary_table(np.array([[120.0, 0.0, 60.0], [-80.0, 90.0, 60.0], [0.0, -120.0, 140.0]]))
+    frame, named = frame.assign(c_rad=-frame["c_rad"]), {}
     for of in ("register", "robot"):
-        found = find_gross_error(frame, IngestSpec("file.csv", frame=of), robot)
-        named[of] = found.advice
+        named[of] = find_gross_error(frame, IngestSpec("file.csv", frame=of), robot).advice
     assert "signs: {c_rad: -1}" in named["register"] and " or " in named["register"]
     assert named["robot"] == "signs: {c_rad: -1}"
+
+
+def test_a_tool_that_stays_at_one_place_on_a_rotary_table_is_no_wrong_unit(tmp_path):
+    """An R-test: all drives move, the commanded places spread over rounding and the measured ones over the errors."""
+    robot, frame = _rotary_table(np.array([[120.0, 0.0, 60.0]]))
+    errors = np.random.default_rng(2).normal(0.0, 0.02, (len(frame), 3))
+    frame = frame.assign(**rows.vector_columns("measured", rows.measured(frame) + errors))
+    frame.to_csv(tmp_path / "mine.csv", index=False)
+    assert len(ingest(IngestSpec(str(tmp_path / "mine.csv")), robot).measurements) == len(frame)
 
 
 def test_two_mistakes_at_once_are_named():

@@ -107,7 +107,7 @@ def test_orientations_have_to_fit_the_positions(tmp_path):
     for change in ({"sequence": "XYZ"}, {"rotation_unit": "rad"}):
         _refused(
             tmp_path,
-            r"log_x.csv, column measured_rx_rad.*: got orientations that differ by",
+            r"log_x.csv, column measured_qx, .*: got orientations that differ by",
             error=IngestError,
             readings={"tcp": reading | change},
         )
