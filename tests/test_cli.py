@@ -280,6 +280,14 @@ def test_the_place_of_the_tool_is_an_option_for_a_user_of_the_command():
     assert options_in(said) == ["--tool 85.9,12,-29.9"]
 
 
+def test_alternatives_of_a_message_are_alternatives_of_the_command():
+    """Two values of one key in a line, of which the last one would have counted."""
+    said = "allowed: signs: {x_mm: -1} or signs: {c_rad: -1}, which leaves 0.02 mm\nanother problem; unit: m fits"
+    assert options_in(said) == ["--set 'signs={x_mm: -1}' or --set 'signs={c_rad: -1}'", "--set unit=m"]
+    both = "allowed: unit: m and drive_unit: mm, which leaves 0.02 mm"
+    assert options_in(both) == ["--set unit=m --set drive_unit=mm"]
+
+
 def test_a_proposal_is_a_command_as_well_as_yaml(tmp_path, capsys):
     frame = pd.read_csv("data/field_12.csv")
     frame.rename(columns={f"measured_{a}_mm": f"SMR {a.upper()}" for a in "xyz"}).to_csv(
