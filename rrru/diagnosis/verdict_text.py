@@ -289,7 +289,7 @@ def _scatter_parts(facts: Facts, least: float = 0.0) -> list[Facts]:
 
 
 def _left(facts: Facts) -> list[str]:
-    """Residual error with the effects in the simulator."""
+    """Residual error with the effects in the simulator, and whether left-out points show that it is smaller."""
     after, noise = (rounded(facts[name]) for name in ("gap_after_rms_mm", "noise_rms_mm"))
     named = {0: "", 1: "it"}.get(len(facts["effects"]), "them")
     further = f"possible further causes ({', '.join(map(readable, facts['unnamed']))})" if facts["unnamed"] else ""
@@ -300,7 +300,10 @@ def _left(facts: Facts) -> list[str]:
     else:
         noise = f"{noise} mm"
     size = f"{after} mm; the noise{found} is {noise}"
-    return [f"With {what} in the simulator the residual error at left-out points is {size}."]
+    said = [f"With {what} in the simulator the residual error at left-out points is {size}."]
+    if facts["gap_rms_mm"] <= facts["gap_after_rms_mm"] and facts["gap_rms_mm"] < facts["noise_rms_mm"]:
+        said.append("That it shrinks cannot be seen at these points: it is too small relative to the noise.")
+    return said
 
 
 def _open(facts: Facts) -> list[str]:

@@ -208,6 +208,15 @@ def test_the_model_says_what_it_has_besides_the_named_causes(effects, who):
     )
 
 
+def test_a_gap_that_is_no_smaller_with_its_cause_is_said_to_be_too_small_to_see():
+    """100 poses with a noise of 0.1 mm: "the residual error is 0.015 mm", and 0.027 mm with the cause."""
+    said = "That it shrinks cannot be seen at these points: it is too small relative to the noise."
+    sizes = {"gap_rms_mm": 0.015, "gap_after_rms_mm": 0.027, "noise_rms_mm": 0.1}
+    assert said in answered(effects="link_flexure", **sizes)["sentences"]
+    assert said not in answered(effects="link_flexure", **sizes | {"gap_rms_mm": 0.03})["sentences"]
+    assert said not in answered(effects="link_flexure", **sizes | {"noise_rms_mm": 0.01})["sentences"]
+
+
 def test_a_cause_of_the_corrected_model_without_a_name_has_a_sentence_with_its_share():
     budget = synthetic_gap.gap_budget(CAMPAIGN)
     own = budget["part"] == "backlash"

@@ -103,6 +103,7 @@ _CASES = [
     ("it does not repeat", ({"share": "0"}, {}, _FACTS), ({"share": "14"}, {}, _FACTS)),
     ("it is random error", ({"share": "0"}, {}, _FACTS), ({}, {}, _FACTS)),
     ("what is left with it", ({"value": "0.011"}, {}, _FACTS), ({"value": "0.05"}, {}, _FACTS)),
+    ("that it shrinks cannot be seen", ({}, {"before_mm": 0.02}, _FACTS), ({}, {}, _FACTS)),
     ("next, a run", ({"run": "stops in reverse"}, {}, _FACTS), ({"run": "line_9 once more"}, {}, _FACTS)),
     ("next, none is advised", ({}, _UNKNOWN, _OUTSIDE), ({}, {}, _OUTSIDE)),
     (

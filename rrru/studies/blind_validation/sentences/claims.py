@@ -70,6 +70,7 @@ _SENTENCES = {
     "it looks random and repeats": rf"(?:{_SHARE}|An undetermined share|Some of it) looks like random error\..*",
     "what is left with it": rf"With {_MODEL} in the simulator the residual error at left-out points is {_X} mm; "
     rf"the noise(?: that was found)? is {_Y} mm(?: \(stated: {_NUMBER} mm in space\))?\.",
+    "that it shrinks cannot be seen": r"That it shrinks cannot be seen at these points: .*",
     "these data cannot rule out": r"(?:These data cannot rule out|Parts of the unexplained share could be): "
     r"(?P<names>.*)\.",
     "next, a run": r"Next: (?:drive|measure) (?P<run>.*)\. That (?:decides|would help to decide) "

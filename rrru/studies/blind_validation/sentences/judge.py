@@ -378,6 +378,7 @@ _JUDGES = {
     "it does not repeat": _scatter,
     "it is random error": _scatter,
     "what is left with it": lambda stated, t, _: _sized(stated["value"], t.after_mm, t, t.rows),
+    "that it shrinks cannot be seen": lambda _, t, __: t.before_mm < t.noise_rms_mm,
     "next, a run": _next_run,
     "next, none is advised": _unexplained,
     "next, nothing more": lambda _, t, facts: _verdict_right(facts, t),
