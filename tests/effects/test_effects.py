@@ -41,6 +41,7 @@ _NAMES = (
     "base_drift",
     "encoder_ovality",
     "friction_windup",
+    "link_growth",
     "pedestal_compliance",
     "tracker_scale",
 )
@@ -54,7 +55,7 @@ _ACTS_AT = {
     **dict.fromkeys(("transmission_error", "servo_lag", "friction_windup", "encoder_ovality"), _DRIVES),
     **dict.fromkeys(("link_flexure", "joint_clearance"), ("wrist",)),
     **dict.fromkeys(("axis_tilt", "base_placement"), ("foot",)),
-    "leg_asymmetry": ("elbow", "knee", "wrist"),
+    **dict.fromkeys(("leg_asymmetry", "link_growth"), ("elbow", "knee", "wrist")),
     "thermal_growth": ("foot", "elbow", "knee", "wrist", "platform"),
     **dict.fromkeys(("frame_misregistration", "tracker_scale", "base_drift", "pedestal_compliance"), "world"),
     "joint_axis_error": ("drive", "elbow", "knee", "wrist", "cross"),
@@ -79,8 +80,8 @@ def _under(effect, coordinates, shape=None):
 def test_the_library_holds_the_robots_effects_in_their_order():
     assert tuple(EFFECTS) == _NAMES
     assert tuple(name for name in NAMES if name in EFFECTS) == _NAMES
-    others = {"drive_error_function", "transmission_orders", "read_before_rest", "thermal_expansion", "link_growth"}
-    others |= {"zero_drift", "gain_error"}
+    others = {"drive_error_function", "transmission_orders", "read_before_rest", "thermal_expansion", "zero_drift"}
+    others |= {"gain_error"}
     assert set(NAMES) - set(EFFECTS) - set(SLIDER_EFFECTS) == {"tool_offset", "cross_compliance"} | others
 
 

@@ -71,3 +71,18 @@ def test_a_warm_robot_is_the_cold_one_enlarged():
     assert (second > first).all() and (third > second).all()
     # at the start it is cold
     np.testing.assert_allclose(position[0], plan.targets()[0], atol=1e-9)
+
+
+def test_links_that_grow_are_those_of_a_robot_with_longer_links():
+    """Of each leg the arm by one strain, offset and forearm by another, against the closed form of unequal legs."""
+    arms, rods = np.array([[2e-3, 0.0, 1e-3], [0.0, 3e-3, 5e-4]])
+    section = per_leg("arm_strain", arms) | per_leg("rod_strain", rods) | {"time_constant": 1.0}
+    plan = plan_of(FORWARD, trajectories=(LINE, SPIRAL))
+    motion, position, turned = drive({"link_growth": section}, plan)
+    warm = motion.time_s > 40.0
+    assert warm.any() and turned.max() < 1e-12
+    paper, lengths = Rrru3(parameter_set="published"), (ROBOT.L1_mm, ROBOT.L2_mm, ROBOT.L3_mm)
+    longer = np.transpose([arms, rods, rods]) * lengths
+    named = {f"dL{leg}{link}": longer[leg - 1, link - 1] for leg in (1, 2, 3) for link in (1, 2, 3)}
+    exact = paper.forward(motion.drive[warm], paper.parameters.vector(named), plan.targets()[warm])
+    np.testing.assert_allclose(position[warm], exact, atol=1e-8)
