@@ -17,6 +17,7 @@ from rrru.campaign.ingest.gross_advice import place_words
 from rrru.campaign.ingest.orientations import other_readings
 from rrru.campaign.ingest.outliers import strays
 from rrru.campaign.ingest.sheet import MEASURED, TURNS, Sheet, position_text
+from rrru.campaign.ingest.small_turns import common_shift
 from rrru.campaign.ingest.zero_offsets import LARGE, found_zeros
 from rrru.campaign.outliers import MAX_ROBUST_SDS, MEDIAN_OF_LENGTH, robust_sd
 from rrru.campaign.target_registration import axes_by_turning
@@ -134,6 +135,9 @@ def target_placement(sheet: Sheet) -> TargetPlacement | None:
         axes, _ = axes_by_turning(poses.turn)
         still = axes[:, np.ptp(poses.turn @ axes, axis=0).max(axis=0) < _NEVER_TURNS_RAD]
         place = place + still @ still.T @ (np.asarray(sheet.mechanism.tool_mm) - np.unique(place, axis=0).mean(axis=0))
+        if still.shape[1] == 3:
+            # unless the small turns by the robot's errors show another place
+            place = place + _by_small_turns(sheet, frames, (poses, sheet.actuators(command) + zeros, command), place)
     turn = np.eye(3)
     if named and not set(frames.names) <= set(sheet.spec.targets):
         posed = poses, sheet.actuators(command) + zeros, command
@@ -173,12 +177,30 @@ def _frames(sheet: Sheet, named: bool) -> tuple[Frames, tuple[str, ...]]:
 
 def _zeros(sheet: Sheet, frames: Frames, command: np.ndarray) -> tuple[np.ndarray, np.ndarray, bool]:
     """Zero offsets (K,) of the drives in rad or mm, how far they are off, and whether zeros are lost: `found_zeros`."""
-    chosen = np.flatnonzero(frames.framing)
-    if len(chosen) > _MAX_ROWS:
-        chosen = np.sort(np.random.default_rng(0).choice(chosen, _MAX_ROWS, replace=False))
+    chosen = _some_rows(frames.framing)
     seen = Readings(frames.seen_mm, frames.names, frames.place_mm, on_world=frames.on_world).of(chosen)
     framed = frames.select(chosen).framed
     return found_zeros(sheet.mechanism, (sheet.actuators(command)[chosen], command[chosen]), seen, framed)
+
+
+def _by_small_turns(
+    sheet: Sheet, frames: Frames, posed: tuple[Poses, np.ndarray, np.ndarray], place: np.ndarray
+) -> np.ndarray:
+    """The `common_shift` (3,) of places (n, 3) by some of the readings; posed: as of `_by_zeros`."""
+    poses, drive, command = posed
+    chosen = _some_rows(frames.framing)
+    its, at = frames.select(chosen), place[chosen]
+    framed = its.framed(poses.of(chosen), (frames.fitted(poses)[0], at))
+    readings = Readings(framed.position_mm, its.names, at)
+    return common_shift(sheet.mechanism, (drive[chosen], command[chosen]), readings)
+
+
+def _some_rows(usable: np.ndarray) -> np.ndarray:
+    """Rows (m,) of a fit, at most _MAX_ROWS of those that are usable (n,)."""
+    chosen = np.flatnonzero(usable)
+    if len(chosen) > _MAX_ROWS:
+        chosen = np.sort(np.random.default_rng(0).choice(chosen, _MAX_ROWS, replace=False))
+    return chosen
 
 
 def _refuse_places(sheet: Sheet, left_mm: float, lost: bool) -> None:
@@ -323,7 +345,9 @@ def _place_notes(
         if frames.on_world[k]:
             result.append(f"reflector {name} found at {position_text(place[k])}, fixed to the world")
         elif not np.isfinite(errors).any():
-            at = f"reflector {name} assumed at {position_text(place[k])} on the platform, the mean of all at the tool"
+            shifted = not np.allclose(np.unique(place, axis=0).mean(axis=0), sheet.mechanism.tool_mm)
+            reason = "which fits its small turns best" if shifted else "the mean of all at the tool"
+            at = f"reflector {name} assumed at {position_text(place[k])} on the platform, {reason}"
             result.append(f"{at}: a platform that never turns does not determine it, {_STATE_PLACE}")
         else:
             known = np.isfinite(errors)
