@@ -31,6 +31,9 @@ _SINGULAR_SHARE = 1e-9
 _SHORTEST_STEP, _ESCAPE_STEP = 1e-6, 0.01
 # values beyond a drive's range by no more than this share of it are in it: rounding
 _SLACK = 1e-6
+# a position off the surface that a robot's tool can reach, of two drives a plane, is met by the nearest one on it where
+# it is off by less than this share of the robot's size, as errors of its parts are
+_OFF_SURFACE_SHARE = 2e-3
 # a pose followed from home is used where its distance from where it should be is below this share of home's distance
 _MAX_DISTANCE_SHARE = 0.1
 
@@ -49,12 +52,14 @@ def inverse_kinematics(
 
     goal: positions (n, 3) of the tool and orientations (n, 3, 3) of the platform, met where the drives can choose
     it; start: actuator values (n, K) and positions (n, 3) near which to search; nearest: whether the nearest
-    position that the drives can reach is accepted.
+    position that the drives can reach is accepted however far it is.
     """
     (position, wanted), (start_actuators, near) = goal, start
     actuators = np.array(start_actuators, dtype=float)
     poses, left = robot.solve(actuators, near, twists), np.full(len(position), np.inf)
     (low, high), widths = np.asarray(robot.drive_range, dtype=float).T, _widths(robot)
+    # of a robot that reaches all positions no error is left
+    off_surface_mm = _ACCEPTED_MM if robot.degrees_of_freedom[0] == 3 else _OFF_SURFACE_SHARE * robot.size_mm
     rows, going = np.arange(len(position)), np.isfinite(actuators).all(axis=1)
     for _ in range(_MAX_STEPS):
         going = going & poses.closed & ~(left[rows] < _REACHED_MM)
@@ -69,10 +74,10 @@ def inverse_kinematics(
         longest, gain = np.abs(step).max(axis=1), (at.drive_response @ (widths * step)[:, :, None])[:, :, 0]
         # an error that no drive changes stays: a point off the plane of a planar robot
         off_mm = np.linalg.norm(error_mm - gain, axis=1)
-        going = nearest | singular | (longest >= _SHORTEST_STEP) | (off_mm < _ACCEPTED_MM)
-        if nearest:
-            # a plane that deviations have tilted does not contain the commanded points: the nearest ones replace them
-            error_mm = np.where(singular[:, None], error_mm, gain)
+        accepted = nearest | (off_mm < off_surface_mm)
+        going = accepted | singular | (longest >= _SHORTEST_STEP)
+        # a plane that errors have tilted does not contain the commanded points: the nearest ones replace them
+        error_mm = np.where((accepted & ~singular)[:, None], gain, error_mm)
         left[rows] = np.linalg.norm(error_mm, axis=1) + robot.characteristic_length_mm * error_of_turn
         step *= np.minimum(1.0, _LONGEST_STEP / np.maximum(longest, 1e-9))[:, None]
         # a stretched arm gets no step in the direction of its singularity: it is moved away from there

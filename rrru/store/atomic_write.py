@@ -15,7 +15,8 @@ def whole(*paths: str | Path) -> Iterator[list[Path]]:
     where the system refuses: the disk is full, the folder may not be written to.
     """
     files = [Path(path) for path in paths]
-    partial = [file.parent / f".{file.name}.partial" for file in files]
+    # a reader may go by the ending
+    partial = [file.parent / f".{file.stem}.partial{file.suffix}" for file in files]
     try:
         for file in files:
             file.parent.mkdir(parents=True, exist_ok=True)

@@ -182,7 +182,7 @@ def test_a_failed_save_leaves_the_old_files_and_nothing_else(frames, tmp_path, m
     def fail(canvas, path, **options):
         # the arrangement before asks for a canvas of no file
         if isinstance(path, Path):
-            assert [one.name for one in tmp_path.glob(".*")] == [".a.pdf.partial"]
+            assert [one.name for one in tmp_path.glob(".*")] == [".a.partial.pdf"]
             raise OSError("disk full")
         return whole(canvas, path, **options)
 

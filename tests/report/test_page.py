@@ -46,7 +46,7 @@ def test_a_part_of_a_run_is_shown_and_what_an_earlier_one_has_left_is_not(folder
     assert "earlier" not in text and "What to see." in text
     for lacking in ("table-gap_shrink", 'id="calibration"', 'id="printers"'):
         assert lacking not in text
-    assert written(folder) == text and not list(folder.glob("*.partial"))
+    assert written(folder) == text and not list(folder.glob("*.partial*"))
 
 
 def test_the_corrected_file_of_a_robot_is_linked_from_where_the_page_lies(folder):

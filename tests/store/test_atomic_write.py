@@ -30,7 +30,7 @@ def test_a_full_disk_leaves_what_was_there(name, tmp_path):
     """The first write goes to a device that is always full."""
     path = tmp_path / name
     path.write_bytes(b"earlier")
-    (tmp_path / f".{name}.partial").symlink_to("/dev/full")
+    (tmp_path / f".{path.stem}.partial{path.suffix}").symlink_to("/dev/full")
     with pytest.raises(WriteError) as caught:
         WRITERS[name](path)
     message = str(caught.value)

@@ -115,4 +115,4 @@ def test_a_refused_file_says_where_and_leaves_nothing(tmp_path):
         "bad.csv, row 18, column measured_y_mm: got 'oops'" in output
         and "Traceback" not in output.split("IngestError")[-1]
     )
-    assert not list((tmp_path / "build").rglob("*.parquet")) and not list((tmp_path / "build").rglob("*.partial"))
+    assert not list((tmp_path / "build").rglob("*.parquet")) and not list((tmp_path / "build").rglob("*.partial*"))
