@@ -55,5 +55,5 @@ def test_the_corrected_file_has_drive_values_for_positions_of_the_plane(tmp_path
     assert np.isfinite(needed).all()
     # as far off as the plane is tilted
     np.testing.assert_allclose(corrected.forward(needed), goal, rtol=0.0, atol=5.0 * _NOISE_MM)
-    off_the_plane = goal + [0.0, 0.0, 20.0]
+    off_the_plane = goal + np.array([0.0, 0.0, 20.0])
     assert np.isnan(corrected.inverse(off_the_plane)).all()
