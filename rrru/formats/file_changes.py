@@ -18,15 +18,13 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from rrru.formats.joint_graph import Move, Seam, inverse_placement, placed
-from rrru.formats.mjcf_reader import Assembly, ends_of
+from rrru.formats.mjcf_reader import MEASURED_TOOL, Assembly, ends_of
 from rrru.formats.structure import Structure
 from rrru.kinematics.base_parameters import Candidate
 from rrru.kinematics.legs import TOOL, WORLD
 
 _BALL = mujoco.mjtJoint.mjJNT_BALL
 _NOTHING, _STAYS = np.zeros(6), (np.eye(4), "")
-# the name of the measured point in a file, where it has moved
-MEASURED_TOOL = "measured_tool"
 # smaller changes, in mm and rad, are rounding
 SAME = 1e-10
 

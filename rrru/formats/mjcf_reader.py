@@ -18,6 +18,8 @@ from rrru.formats.joint_graph import Item, Move, Seam, inverse_placement, placed
 from rrru.kinematics.legs import X, Y, Z
 
 MM = 1000.0
+# the name of the measured point in a file, where it has moved
+MEASURED_TOOL = "measured_tool"
 _EQ, _JOINT = mujoco.mjtEq, mujoco.mjtJoint
 # two joints are on one line within this, in m and rad
 _SAME = 1e-9

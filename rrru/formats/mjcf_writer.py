@@ -12,10 +12,10 @@ from xml.etree.ElementTree import Element
 import mujoco
 import numpy as np
 
-from rrru.formats.file_changes import MEASURED_TOOL, SAME, Found, TwistsBySite, changes_of, difference, scatter
+from rrru.formats.file_changes import SAME, Found, TwistsBySite, changes_of, difference, scatter
 from rrru.formats.mjcf_drives import write_backlash, write_stiffness
 from rrru.formats.mjcf_home import close_keys
-from rrru.formats.mjcf_reader import MM, ends_of
+from rrru.formats.mjcf_reader import MEASURED_TOOL, MM, ends_of
 from rrru.formats.mjcf_text import MjcfDocument
 from rrru.formats.robot_file import mjcf_parts
 from rrru.formats.structure import Structure, structure_of

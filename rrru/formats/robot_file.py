@@ -19,7 +19,7 @@ from rrru.formats import urdf_reader as urdf_files
 from rrru.formats.couplings import JointCoupling, couplings_of_equalities, couplings_of_mimics
 from rrru.formats.inertia import point_masses_of
 from rrru.formats.joint_graph import Move
-from rrru.formats.mjcf_reader import MM, Assembly
+from rrru.formats.mjcf_reader import MEASURED_TOOL, MM, Assembly
 from rrru.formats.structure import structure_of
 from rrru.kinematics.end_effectors import shared_joints, with_hands
 from rrru.kinematics.general_robot import GeneralRobot
@@ -118,10 +118,16 @@ def from_mjcf(path: str | Path, platform: str, **options: Any) -> GeneralRobot:
 
     Joints with actuators are driven, and so are those that follow them by a joint equality. The home pose is that of
     the first keyframe, else of the reference configuration; loops that are open there by less than a millimetre are
-    closed. options: of GeneralRobot. The platform's frame is its body's. Raises ConfigError for a file that cannot be
-    read or is no robot.
+    closed. options: of GeneralRobot. The platform's frame is its body's. Without a stated tool_mm the measured point is
+    the platform's site of the name that `rrru.formats.mjcf_writer` gives it, if there is one. Raises ConfigError for a
+    file that cannot be read or is no robot.
     """
-    return _robot(*mjcf_parts(path, platform), options)
+    parts = mjcf_parts(path, platform)
+    model = parts[0].model
+    site = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, MEASURED_TOOL)
+    if site >= 0 and model.site_bodyid[site] == model.body(platform).id:
+        options = {"tool_mm": tuple((MM * model.site_pos[site]).tolist())} | options
+    return _robot(*parts, options)
 
 
 def mjcf_parts(

@@ -22,8 +22,8 @@ from rrru.simulation.virtual_robot import VirtualRobot
 ROBOT = Rrru3()
 MODEL = with_wide_bounds(ROBOT)
 MASSES = Masses()
-# effects of many waves, and growth of single links, which holds that of all, have tests of their own, and these campaigns
-# do not show the others: their robot does not stop, has no thermometer, and all its lengths are calibrated
+# effects of many waves, and growth of single links, which holds that of all, have tests of their own, and these
+# campaigns do not show the others: their robot does not stop, has no thermometer, and all its lengths are calibrated
 _ELSEWHERE = (
     "drive_error_function",
     "transmission_orders",

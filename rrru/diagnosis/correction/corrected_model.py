@@ -197,6 +197,9 @@ def gap_rows(
 
 def _robot(problem: DiagnosisProblem, section: dict[str, Any]) -> Robot:
     """The robot of a file."""
+    if "mjcf" in section:
+        # what was found of the tool is counted from where it was, not from where a corrected file has it
+        section = section | {"tool_mm": [*problem.mechanism.tool_mm]}
     robot = make_mechanism(problem.mechanism.name, section, parameter_set="frame")
     reading: Robot = robot.with_measurement_config(problem.mechanism.measurement_config)
     return reading
