@@ -354,9 +354,13 @@ def _share(row: pd.Series, words: str = "") -> str:
     shares = [row[f"share_closed{end}"] for end in ("", "_low", "_high")]
     if not np.isfinite(shares[0]):
         return "–"
-    open_ended = min(shares[2], 1.0) - max(shares[1], 0.0) >= _UNDETERMINED
+    # an estimate below zero of what may be above it says as little as an interval of all shares
+    below = shares[0] < 0.0 < shares[2]
+    open_ended = below or min(shares[2], 1.0) - max(shares[1], 0.0) >= _UNDETERMINED
     if words and open_ended:
         return "explained fraction not determined"
+    if below:
+        return "?"
     value, low, high = (f"{100.0 * share:.0f}".replace("-", "\N{MINUS SIGN}") for share in shares)
     if not np.isfinite(shares).all():
         return f"{value} %{words}"

@@ -379,6 +379,15 @@ def test_a_share_of_few_readings_has_no_interval(frames):
     assert [label.endswith("% (?)") for label in labels] == [False] + [True] * (len(labels) - 1)
 
 
+def test_a_share_below_zero_of_what_may_be_above_it_is_not_determined(frames):
+    """100 poses with a gap far below the noise: the headline had "-100 % explained (95 %: -100 to 61)"."""
+    below = {"share_closed": -1.0, "share_closed_low": -1.0, "share_closed_high": 0.61}
+    figure = draw("gap", frames | {name: frames[name].assign(**below) for name in ("gap_verdicts", "gap_shrink")})
+    assert any("explained fraction not determined" in text.get_text() for text in figure.axes[0].texts)
+    labels = panel(figure, "(c)").child_axes[0].get_yticklabels()
+    assert {text.get_text() for text in labels} == {"?"}
+
+
 @pytest.mark.parametrize("covariance", [-0.55, 0.2])
 def test_names_of_the_budget_neither_overlap_nor_leave_the_bar(covariance):
     """With small parts next to each other, and with covariances left of 0."""
