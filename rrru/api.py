@@ -200,7 +200,7 @@ class DiagnosisResult:
     >>> diagnosis.parameters.query("effect == 'thermal_growth'")["parameter"].tolist()
     ['strain', 'time_constant']
     >>> diagnosis.budget.query("part == 'thermal_growth'")["share"].round(1).item()
-    1.0
+    0.9
     >>> diagnosis.next_runs.empty
     True
     >>> '"name": "thermal_growth"' in diagnosis.to_json()

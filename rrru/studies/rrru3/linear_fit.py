@@ -16,7 +16,10 @@ _MOST_STEPS, _LEAST_SHARE, _LEAST_GAIN_MM = 60, 1e-3, 1e-7
 _LEAST_DISTANCE_MM, _LEAST_PIVOT = 1e-9, 1e-14
 
 # sums over points are taken in any order, so that they vectorise
-_vectorised = numba.njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz"})
+_FAST = {"reassoc", "contract", "nsz"}
+_compiled = numba.njit(cache=True, error_model="numpy", fastmath=_FAST)
+# inlined by its caller: see `rrru.robots.rrru3_kernels`
+_part = numba.njit(forceinline=True, error_model="numpy", fastmath=_FAST)
 
 
 def linear_fit(mechanism, theta, measured, start):
@@ -50,18 +53,14 @@ def linear_fit(mechanism, theta, measured, start):
     return found, value
 
 
-@numba.njit(cache=True)
 def _linearised(arrays, deviations, near, model):
     """Positions (n, 3) of the model with deviations (p,), and their derivatives (n, 3, p); NaN beyond the workspace."""
     (cosine, sine, theta), (nominal, turn, leg_map) = arrays, model
-    legs = nominal.copy()
-    for p in range(len(deviations)):
-        legs += leg_map[:, :, p] * deviations[p]
+    legs = nominal + leg_map @ deviations
     position = np.ascontiguousarray(forward(legs.reshape(1, 3, 5), turn, cosine, sine, near)[0].T)
     return position, parameter_jacobian(position, theta, legs, turn, leg_map)
 
 
-@numba.njit(cache=True)
 def _least_squares(arrays, measured, near, model, bounds):
     """Deviations (p,) of least squares, clipped to bounds (low, high), by three steps of Gauss and Newton.
 
@@ -80,7 +79,7 @@ def _least_squares(arrays, measured, near, model, bounds):
     return deviations
 
 
-@_vectorised
+@_compiled
 def _newton(stiffness, residual, basis, gram, start, back, middle):
     """Coordinates q (d, p) that minimise the mean distances of residuals (d, 3, n) - q basis (p, 3, n), and the minima.
 
@@ -154,7 +153,7 @@ def _newton(stiffness, residual, basis, gram, start, back, middle):
     return found, least
 
 
-@_vectorised
+@_part
 def _add(vectors, factors, basis):
     """Add factors (p,) of a basis (p, 3, n) to vectors (3, n), in place."""
     for p in range(len(factors)):
@@ -163,7 +162,7 @@ def _add(vectors, factors, basis):
                 vectors[a, n] += factors[p] * basis[p, a, n]
 
 
-@numba.njit(cache=True)
+@numba.njit(forceinline=True, error_model="numpy")
 def _solve(matrix, right, result):
     """Solution (p,) of a positive definite matrix (p, p), of which the lower half is given, by Cholesky in place."""
     size = len(right)
@@ -185,7 +184,7 @@ def _solve(matrix, right, result):
         result[p] = rest / matrix[p, p]
 
 
-@_vectorised
+@_part
 def _value(left, moved, share, place, moves, stiffness):
     """Mean distance of residuals left (3, n) after a share of a step, which changes them by -moved, and the penalty."""
     total = 0.0
