@@ -1,6 +1,6 @@
 """Which effects cause the gap: calibrate, search the best set, fit it on the exact model, search again from there."""
 
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -175,10 +175,15 @@ def _noise_columns(
     """
     blocks, searched = _blocks(problem, linear)
     for chosen, prior_sd in _fewer_blocks(problem, linear, blocks):
-        columns = np.concatenate([linear.base, *chosen.values(), *linear.shape_columns.values()], axis=-1)
+        columns = _with_base(linear, chosen)
         if _leaves_enough(problem, linear, columns, prior_sd):
             return _with_significant(problem, linear, (columns, prior_sd), searched)
     return (columns if known else linear.base), None
+
+
+def _with_base(linear: LinearizedProblem, blocks: Mapping[EffectKey, FloatArray]) -> FloatArray:
+    """Columns (m, 3, k) of the calibration, of blocks, and of the shapes that are fitted."""
+    return np.concatenate([linear.base, *blocks.values(), *linear.shape_columns.values()], axis=-1)
 
 
 def _least_columns(problem: DiagnosisProblem, linear: LinearizedProblem) -> tuple[FloatArray, FloatArray | None]:
@@ -186,7 +191,7 @@ def _least_columns(problem: DiagnosisProblem, linear: LinearizedProblem) -> tupl
     blocks, searched = _blocks(problem, linear)
     steps = list(_fewer_blocks(problem, linear, blocks))
     chosen, prior_sd = ([step for step in steps if step[1] is not None] or steps)[-1]
-    columns = np.concatenate([linear.base, *chosen.values(), *linear.shape_columns.values()], axis=-1)
+    columns = _with_base(linear, chosen)
     return _with_significant(problem, linear, (columns, prior_sd), searched)
 
 

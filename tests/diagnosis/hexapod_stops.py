@@ -57,8 +57,11 @@ def reached(order, between, width_mm, seed=0):
     return commanded, np.array(actual), (position, turn)
 
 
-def _standing(wanted, start, base, platform):
-    """Poses at which legs between other joints have the wanted lengths (n, 6), by Newton from poses."""
+def standing(wanted, start, base, platform):
+    """Poses at which six legs have the wanted lengths (n, 6) or (6,), by Newton from poses (n).
+
+    base: their joints (6, 3), or (n, 6, 3) where drives move them; platform (6, 3): the others, in its frame.
+    """
     position, turn = (values.copy() for values in start)
     for _ in range(20):
         arm = np.einsum("nij,kj->nki", turn, platform)
@@ -80,7 +83,7 @@ def file_of(order, between, width_mm=0.1, seed=0):
     commanded, actual, start = reached(order, between, np.full(6, width_mm), seed)
     generator = np.random.default_rng(seed + 1000)
     base, platform = (places + _ERROR_MM * generator.standard_normal((6, 3)) for places in (BASE, PLATFORM))
-    position, turn = _standing(actual + _ERROR_MM * generator.standard_normal(6), start, base, platform)
+    position, turn = standing(actual + _ERROR_MM * generator.standard_normal(6), start, base, platform)
     seen = np.stack([position + turn @ np.array(place) for place in PLACES.values()], axis=1).reshape(-1, 3)
     seen = seen + NOISE_MM * generator.standard_normal(seen.shape)
     drives = dict(zip(DRIVES, np.repeat(commanded, len(PLACES), axis=0).T, strict=True))

@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 from scipy.spatial.transform import Rotation
 
+from tests.diagnosis.hexapod_stops import standing
 from tests.formats.mjcf import GEOM, mjcf, servos, text_of
 
 NOISE_MM, BALL = 0.01, (40.0, 15.0, -25.0)
@@ -48,16 +49,7 @@ def file_of(seed):
     way = way / np.linalg.norm(way, axis=1)[:, None]
     slid = (height + _ERROR_MM * generator.standard_normal(3))[..., None] * way
     balls = upper + np.tile(slid, (1, 2, 1))
-    turn = np.tile(np.eye(3), (_STOPS, 1, 1))
-    for _ in range(30):
-        arm = np.einsum("nij,kj->nki", turn, lower)
-        rod = position[:, None] + arm - balls
-        length = np.linalg.norm(rod, axis=2)
-        along = rod / length[..., None]
-        slopes = np.concatenate([along, np.cross(arm, along)], axis=2)
-        step = np.linalg.solve(slopes, (rods - length)[..., None])[..., 0]
-        position, turn = position + step[:, :3], Rotation.from_rotvec(step[:, 3:]).as_matrix() @ turn
-    assert np.abs(step).max() < 1e-9
+    position, turn = standing(rods, (position, np.tile(np.eye(3), (_STOPS, 1, 1))), balls, lower)
     frame = Rotation.from_rotvec([0.1, -0.2, 0.7]).as_matrix()
     seen = (position + turn @ BALL) @ frame.T + [500.0, 200.0, -100.0]
     seen = seen + NOISE_MM * generator.standard_normal(seen.shape)

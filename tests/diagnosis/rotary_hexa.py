@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 from scipy.spatial.transform import Rotation
 
+from tests.diagnosis.hexapod_stops import standing
 from tests.formats.mjcf import GEOM, mjcf, servos, text_of
 
 NOISE_MM, TIME_CONSTANT_S, STOPS, SECONDS = 0.01, 600.0, 80, 2400.0
@@ -27,25 +28,10 @@ def _knees(base, crank_mm, axis, drive):
     return base + crank * np.cos(turned) + np.cross(axis, crank) * np.sin(turned) + along * (1.0 - np.cos(turned))
 
 
-def _standing(knees, platform, rods_mm, start):
-    """Poses at which rods (n, 6) reach from knees (n, 6, 3) to platform joints (6, 3), by Newton from poses."""
-    position, turn = (values.copy() for values in start)
-    for _ in range(30):
-        arm = np.einsum("nij,kj->nki", turn, platform)
-        rod = position[:, None] + arm - knees
-        length = np.linalg.norm(rod, axis=2)
-        along = rod / length[..., None]
-        slopes = np.concatenate([along, np.cross(arm, along)], axis=2)
-        step = np.linalg.solve(slopes, (rods_mm - length)[..., None])[..., 0]
-        position, turn = position + step[:, :3], Rotation.from_rotvec(step[:, 3:]).as_matrix() @ turn
-    assert np.abs(step).max() < 1e-9
-    return position, turn
-
-
 def _home():
     """The platform's position (3,) with level cranks."""
     knees, start = _knees(_BASE, np.full(6, _CRANK_MM), _AXIS, np.zeros((1, 6))), (np.array([[0.0, 0.0, 340.0]]),)
-    return _standing(knees, _PLATFORM, np.full((1, 6), ROD_MM), (*start, np.eye(3)[None]))[0][0]
+    return standing(np.full((1, 6), ROD_MM), (*start, np.eye(3)[None]), knees, _PLATFORM)[0][0]
 
 
 def _drives(position, turn):
@@ -88,7 +74,7 @@ def file_of(growth_mm=(0.0,) * 6, drift_mm_s=(0.0,) * 3, seed=1):
     axis = _AXIS + _ERROR_RAD * generator.standard_normal((6, 3))
     knees = _knees(base, cranks, axis, drive + _ERROR_RAD * generator.standard_normal(6))
     grown = rods - np.outer(np.expm1(-time / TIME_CONSTANT_S), growth_mm)
-    position, turn = _standing(knees, platform, grown, (position, turn))
+    position, turn = standing(grown, (position, turn), knees, platform)
     position = position + np.outer(time, drift_mm_s)
     seen = np.stack([position + turn @ np.array(place) for place in TARGETS.values()], axis=1).reshape(-1, 3)
     seen = seen + NOISE_MM * generator.standard_normal(seen.shape)

@@ -35,7 +35,7 @@ def _file():
     base, platform = (
         places + 0.3 * generator.standard_normal((6, 3)) for places in (hexapod_stops.BASE, hexapod_stops.PLATFORM)
     )
-    position, turn = hexapod_stops._standing(actual, (position, turn), base, platform)
+    position, turn = hexapod_stops.standing(actual, (position, turn), base, platform)
     position = position + _NOISE_MM * generator.standard_normal(position.shape)
     turns = Rotation.from_rotvec(_NOISE_RAD * generator.standard_normal(position.shape)) * Rotation.from_matrix(turn)
     read = {f"measured_{axis}_mm": position[:, k] for k, axis in enumerate("xyz")}

@@ -346,7 +346,7 @@ def _place_notes(
             result.append(f"reflector {name} found at {position_text(place[k])}, fixed to the world")
         elif not np.isfinite(errors).any():
             shifted = not np.allclose(np.unique(place, axis=0).mean(axis=0), sheet.mechanism.tool_mm)
-            reason = "which fits its small turns best" if shifted else "the mean of all at the tool"
+            reason = "the place that fits best with the robot's errors" if shifted else "the mean of all at the tool"
             at = f"reflector {name} assumed at {position_text(place[k])} on the platform, {reason}"
             result.append(f"{at}: a platform that never turns does not determine it, {_STATE_PLACE}")
         else:

@@ -130,7 +130,7 @@ _READ = {
     "a reflector was found": r"reflector (?P<name>\w+) found at \((?P<place>[^)]*)\) mm on the platform, "
     r"to about (?P<about>\S+) mm(, its place along .* never turns)?",
     "a reflector is assumed": r"reflector (?P<name>\w+) assumed at \((?P<place>[^)]*)\) mm on the platform, "
-    r"(the mean of all at the tool|which fits its small turns best): "
+    r"(the mean of all at the tool|the place that fits best with the robot's errors): "
     r"a platform that never turns does not determine it, state it in `targets`, .*",
     "orientations are turned": rf"orientations are read turned by {_X} degrees from the platform's",
     "zeros are lost": r"(zeros of|the zero of) (?P<count>\d+) drives? (are|is) lost, "
