@@ -377,14 +377,14 @@ class ModelEvidence:
         narrow = [term for k, term in enumerate(terms) if k != broad]
         problem = self.projected(narrow, [level])
         if broad is None:
-            return _AlongPriorScales(problem, lambda _: (none, problem), None)
+            return _AlongPriorScales(lambda _: (none, problem), None)
 
         def after(prior_scales: FloatArray) -> tuple[FloatArray, MarginalProblem]:
             averages = [self._average(terms[broad], prior_scale, level) for prior_scale in prior_scales]
             gram, moment = (np.array(part) for part in zip(*(a.rest(problem.index) for a in averages), strict=True))
             return none + np.array([a.evidence for a in averages]), problem.on(gram, moment)
 
-        return _AlongPriorScales(problem, after, broad)
+        return _AlongPriorScales(after, broad)
 
     @_on_complete
     def scales(self, terms: Sequence[EffectTerm], prior_scales: Sequence[float] | FloatArray) -> FloatArray:
@@ -442,40 +442,26 @@ class _AlongPriorScales:
     the average over its coefficients; broad: its number, None where there is none.
     """
 
-    def __init__(
-        self,
-        problem: MarginalProblem,
-        after: Callable[[FloatArray], tuple[FloatArray, MarginalProblem]],
-        broad: int | None,
-    ) -> None:
+    def __init__(self, after: Callable[[FloatArray], tuple[FloatArray, MarginalProblem]], broad: int | None) -> None:
         self._after, self._broad = after, broad
-        self._owner = problem.owner[: len(problem.owner) - len(problem.weights)]
-        self._made: dict[tuple[int, float], tuple[FloatArray, MarginalProblem]] = {}
+        self._made: dict[float, tuple[FloatArray, MarginalProblem]] = {}
 
     def of_term(self, k: int, prior_scales: FloatArray) -> FloatArray:
         """Log evidence (s,) at PRIOR_SCALES of term k, and at prior_scales (terms,) of the others."""
         others = prior_scales if self._broad is None else np.delete(prior_scales, self._broad)
         if k == self._broad:
-            alone, problem = self._cached(-1, np.inf)
+            alone, problem = self._cached(np.inf)
             return np.asarray(alone + gained_over_cases(problem, others[None])[:, 0])
-        number = k - int(self._broad is not None and k > self._broad)
         rows = np.repeat(others[None], len(PRIOR_SCALES), axis=0)
-        rows[:, number] = PRIOR_SCALES
-        alone, problem = self._cached(number, 1.0 if self._broad is None else float(prior_scales[self._broad]))
+        rows[:, k - int(self._broad is not None and k > self._broad)] = PRIOR_SCALES
+        alone, problem = self._cached(1.0 if self._broad is None else float(prior_scales[self._broad]))
         return np.asarray(alone + gained_over_cases(problem, rows)[0])
 
-    def _cached(self, last: int, of_broad: float) -> tuple[FloatArray, MarginalProblem]:
-        """What `after` gives at a prior scale of the broad term, or at all of them (inf).
-
-        The columns of the term `last`, if any, come last, so that a factor of the others' is made once.
-        """
-        if (-1, of_broad) not in self._made:
-            self._made[-1, of_broad] = self._after(PRIOR_SCALES if np.isinf(of_broad) else np.array([of_broad]))
-        if (last, of_broad) not in self._made:
-            alone, problem = self._made[-1, of_broad]
-            columns = np.argsort(self._owner == last, kind="stable")
-            self._made[last, of_broad] = alone, problem.reordered(range(len(problem.at_least)), columns)
-        return self._made[last, of_broad]
+    def _cached(self, of_broad: float) -> tuple[FloatArray, MarginalProblem]:
+        """What `after` gives at a prior scale of the broad term, or at all of them (inf)."""
+        if of_broad not in self._made:
+            self._made[of_broad] = self._after(PRIOR_SCALES if np.isinf(of_broad) else np.array([of_broad]))
+        return self._made[of_broad]
 
 
 def averaged(value: FloatArray, terms: int) -> FloatArray:

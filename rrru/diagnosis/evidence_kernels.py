@@ -205,9 +205,9 @@ def _factorize(
 ) -> None:
     """Cholesky factor L of I + S gram S with S = diag(scale), and half = L^-1 S moment, from row first on.
 
-    gram (k, k), moment, scale (k,); low (k, k): L, on its diagonal reciprocals; half (k,); squares (k + 1,): sums of
-    squares of the entries of half before each; logs (k + 1, 2): sums of the pivots' logarithms before each, and a
-    product of pivots whose logarithm is yet to be added.
+    gram (k, k), of which the lower half is read, moment, scale (k,); low (k, k): L, on its diagonal reciprocals;
+    half (k,); squares (k + 1,): sums of squares of the entries of half before each; logs (k + 1, 2): sums of the
+    pivots' logarithms before each, and a product of pivots whose logarithm is yet to be added.
     """
     for r in range(first, len(half)):
         for c in range(r):
@@ -237,13 +237,16 @@ def _find_moments(
     half: FloatArray,
     index: IntArray,
     first: int,
+    fixed: int,
     inverse: FloatArray,
+    known: FloatArray,
     mean: FloatArray,
     covariance: FloatArray,
 ) -> None:
     """Mean (p,) and covariance (p, p) of the coefficients index (p,) under the posterior of untruncated ones.
 
-    low, half: of `_factorize`; inverse (p, k): columns of L^-1, of which rows before the first are up to date.
+    low, half: of `_factorize`; inverse (p, k): columns of L^-1, of which rows before the first are up to date; known
+    (p, p + 1): sums over the rows before `fixed`, which are up to date where the first is not one of these.
     """
     k = len(half)
     for a in range(len(index)):
@@ -255,15 +258,46 @@ def _find_moments(
             for q in range(column, r):
                 entry -= low[r, q] * inverse[a, q]
             inverse[a, r] = entry * low[r, r]
-        entry = 0.0
-        for r in range(column, k):
-            entry += inverse[a, r] * half[r]
-        mean[a] = entry
+        if first < fixed:
+            known[a, -1] = _dot(inverse[a], half, column, fixed)
+            for b in range(a + 1):
+                known[a, b] = _dot(inverse[a], inverse[b], column, fixed)
+        start = max(column, fixed)
+        mean[a] = known[a, -1] + _dot(inverse[a], half, start, k)
         for b in range(a + 1):
-            entry = 0.0
-            for r in range(column, k):
-                entry += inverse[a, r] * inverse[b, r]
-            covariance[a, b] = covariance[b, a] = entry
+            covariance[a, b] = covariance[b, a] = known[a, b] + _dot(inverse[a], inverse[b], start, k)
+
+
+@numba.njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc"}, forceinline=True)
+def _dot(one: FloatArray, other: FloatArray, start: int, end: int) -> float:
+    """Sum of products of two vectors (k,) from an index to one before another."""
+    entry = 0.0
+    for r in range(start, end):
+        entry += one[r] * other[r]
+    return entry
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _order_columns(scale: FloatArray, positive: BoolArray) -> tuple[IntArray, int]:
+    """Order (k,) of columns in which little is computed again, and how many begin it that are alike in all rows (m, k).
+
+    Those alike come first, of these the ones that may be negative: moments are computed from the first positive one on.
+    The others stay in their order, since the last ones change most often.
+    """
+    m, k = scale.shape
+    order, count = np.empty(k, dtype=np.int64), 0
+    alike = np.full(k, True)
+    for c in range(k):
+        for j in range(1, m):
+            if scale[j, c] != scale[0, c]:
+                alike[c] = False
+                break
+    for kind in range(3):
+        for c in range(k):
+            if (2 if not alike[c] else 1 if positive[c] else 0) == kind:
+                order[count] = c
+                count += 1
+    return order, alike.sum()
 
 
 @numba.njit(cache=True, error_model="numpy")
@@ -289,16 +323,23 @@ def log_evidence_and_correction(
 ) -> tuple[FloatArray, FloatArray]:
     """`log_evidence` (v, m), and the correction (v, m) of the probability of non-negative coefficients in it."""
     v, k = moment.shape
-    m, index = scale.shape[0], np.flatnonzero(positive)
+    m, (columns, fixed) = len(scale), _order_columns(scale, positive)
+    deviations, index = scale[:, columns], np.flatnonzero(positive[columns])
     p = len(index)
+    ordered, target = np.empty((k, k)), np.empty(k)
     result, corrections = np.empty((v, m)), np.zeros((v, m))
     low, half, squares, logs = np.zeros((k, k)), np.empty(k), np.zeros(k + 1), np.zeros((k + 1, 2))
     logs[0, 1] = 1.0
     inverse, mean, covariance = np.zeros((p, k)), np.empty(p), np.empty((p, p))
+    known = np.zeros((p, p + 1))
     order, state = np.empty(p, dtype=np.int64), np.empty((p, COLUMNS))
     # prior scales that an effect's upper bound caps have the same deviations
-    same = _earlier_alike(scale)
+    same = _earlier_alike(deviations)
     for level in range(v):
+        for r in range(k):
+            target[r] = moment[level, columns[r]]
+            for c in range(r + 1):
+                ordered[r, c] = gram[level, columns[r], columns[c]]
         before = 0
         for j in range(m):
             if same[j] < j:
@@ -306,13 +347,13 @@ def log_evidence_and_correction(
                 continue
             # rows of the factor stay as long as no scale up to them changes
             first = 0
-            while j > 0 and first < k and scale[j, first] == scale[before, first]:
+            while j > 0 and first < k and deviations[j, first] == deviations[before, first]:
                 first += 1
             before = j
-            _factorize(gram[level], moment[level], scale[j], first, low, half, squares, logs)
+            _factorize(ordered, target, deviations[j], first, low, half, squares, logs)
             total = 0.5 * (squares[k] - logs[k, 0] - math.log(logs[k, 1]))
             if p:
-                _find_moments(low, half, index, first, inverse, mean, covariance)
+                _find_moments(low, half, index, first, fixed, inverse, known, mean, covariance)
                 probability, corrections[level, j] = log_orthant(mean, covariance, order, state)
                 total += probability + p * math.log(2.0)
             result[level, j] = total

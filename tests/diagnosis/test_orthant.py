@@ -141,11 +141,15 @@ def test_the_order_of_the_coefficients_makes_no_difference():
         np.testing.assert_allclose(log_orthant(mean[order], covariance[np.ix_(order, order)]), expected, rtol=1e-8)
 
 
-def test_many_problems_in_one_call_are_those_of_one_call_each():
+@pytest.mark.parametrize("varying", [range(7), (1, 2), (3, 6), (), (0, 5)])
+def test_many_problems_in_one_call_are_those_of_one_call_each(varying):
+    """Whichever coefficients have the same deviation in all of them; at two levels."""
     generator = np.random.default_rng(11)
-    gram, moment, _ = _normal(generator, 7, 1.0)
-    scale = 10.0 ** generator.integers(-1, 2, (60, 7))
+    problems = [_normal(generator, 7, 1.0)[:2] for _ in range(2)]
+    gram, moment = (np.array(part) for part in zip(*problems, strict=True))
+    scale = np.tile(10.0 ** generator.integers(-1, 2, 7), (60, 1))
+    scale[:, list(varying)] = 10.0 ** generator.integers(-1, 2, (60, len(varying)))
     positive = np.array([True, False, True, True, False, True, True])
-    together = log_evidence(gram[None], moment[None], scale, positive)[0]
-    each = [log_evidence(gram[None], moment[None], one[None], positive)[0, 0] for one in scale]
-    np.testing.assert_allclose(together, each, rtol=1e-9)
+    together = log_evidence(gram, moment, scale, positive)
+    each = [log_evidence(gram, moment, one[None], positive)[:, 0] for one in scale]
+    np.testing.assert_allclose(together, np.transpose(each), rtol=1e-9)
