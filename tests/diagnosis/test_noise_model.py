@@ -167,7 +167,7 @@ def test_the_noise_of_one_kind_of_readings_is_no_part_of_that_of_the_other(true)
     generator, found = np.random.default_rng(4), []
     positions = np.arange(240) < 120
     series, size = np.where(positions, 0, 1), np.where(positions, *true)[:, None]
-    for _ in range(10):
+    for _ in range(20):
         data, columns = size * generator.standard_normal((240, 3)), generator.standard_normal((240, 3, 360))
         found.append(high_frequency_noises(data, columns, series, positions))
     assert np.mean(found, axis=0) == pytest.approx(true, rel=0.05)
