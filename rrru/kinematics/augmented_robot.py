@@ -76,7 +76,7 @@ class AugmentedRobot(Robot):
         columns = columns.reshape(-1, columns.shape[2])
         basis, _ = np.linalg.qr(columns[:, :count])
         scale = column_scale(self._added, self.characteristic_length_mm)
-        chosen, _ = choose(columns[:, count:] * scale, [True] * len(scale), LEFT_OF_DATA, basis)
+        chosen, _ = choose(columns[:, count:] * scale, [True] * len(scale), LEFT_OF_DATA, basis=basis)
         return replace(self, added=tuple(self._added[k] for k in chosen))
 
     def with_measurement_config(self, config: MeasurementConfig) -> Robot:

@@ -1,7 +1,7 @@
 """The geometric parameters of any robot, and which of them are identifiable (base parameters). mm, rad."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,17 +15,29 @@ _LOST = {"rad": 0.6, "mm": 100.0}
 # millimetre, as parts and frames have, the others leave five micrometres at most. With 0.002 the hardly determined
 # parameters of a hexapod had twice the stated errors
 LEFT_OF_DATA = 5e-3
+# largest part of a chosen parameter in one that is not chosen, both of one size; assumed
+_MOST_OF_ANOTHER = 2.0
 _AXES = ("x", "y", "z", "rx", "ry", "rz")
 
 
 @dataclass(frozen=True)
 class Candidate:
-    """A geometric parameter: its name, unit ("mm", "rad"), number of its drive (0: none), and twists (6,) by site."""
+    """A geometric parameter.
+
+    name, unit ("mm", "rad"); leg: number of its drive, 0 for none; twists: by site the (6,) of a unit; late: whether it
+    stands only for what no other parameter does.
+    """
 
     name: str
     unit: str
     leg: int
     twists: dict[str, FloatArray]
+    late: bool = False
+
+    @property
+    def rank(self) -> int:
+        """Its rank among the parameters that may replace each other: drives first, late ones last."""
+        return 0 if self.leg else 1 + self.late
 
 
 @dataclass(frozen=True)
@@ -54,9 +66,9 @@ def open_numbers(config: MeasurementConfig) -> tuple[Candidate, ...]:
 def candidates_of(legs: Legs, parts: Parts, config: MeasurementConfig | None = None) -> tuple[Candidate, ...]:
     """All Candidates of Legs, drives first, then lengths along links, other shifts, angles, tool and world.
 
-    Those of the MeasurementConfig come before the others of tool and world. Where places of reflectors are unknown they
-    also come before what does the same as an error of them all: nothing is known about a place, and a tool on its
-    flange is off by less than a place that the nominal robot's poses give.
+    Those of the MeasurementConfig come before the others of tool and world, which are late. Where places of reflectors
+    are unknown what does the same as an error of them all is late, too: nothing is known about a place, and a tool on
+    its flange is off by less than a place that the nominal robot's poses give.
     """
     config = config or MeasurementConfig()
     drives = [
@@ -86,8 +98,12 @@ def candidates_of(legs: Legs, parts: Parts, config: MeasurementConfig | None = N
     every = [*drives, *numbers]
     carries = _carry_the_tool(legs, every) if config.fitted else [False] * len(every)
     others, last = ([one for one, carry in zip(every, carries, strict=True) if carry is late] for late in (False, True))
-    every = [*others, *open_numbers(config), *last, *(_at(*place) for place in outside)]
-    return tuple({candidate.name: candidate for candidate in every}.values())
+    late = [replace(one, late=True) for one in (*last, *(_at(*place) for place in outside))]
+    # the first of a name: of tool and world those of the configuration
+    result: dict[str, Candidate] = {}
+    for one in (*others, *open_numbers(config), *late):
+        result.setdefault(one.name, one)
+    return tuple(result.values())
 
 
 def _carry_the_tool(legs: Legs, candidates: Sequence[Candidate]) -> list[bool]:
@@ -154,24 +170,42 @@ def column_scale(candidates: Sequence[Candidate], characteristic_length_mm: floa
 
 
 def choose(
-    columns: FloatArray, allowed: Sequence[bool], least: float, basis: FloatArray | None = None
+    columns: FloatArray,
+    allowed: Sequence[bool],
+    least: float,
+    ranks: Sequence[int] = (),
+    basis: FloatArray | None = None,
 ) -> tuple[list[int], dict[int, FloatArray]]:
-    """Numbers of the columns (m, c) of which more than the share `least` is independent of the chosen ones before.
+    """Numbers of columns (m, c), in order, that represent all others but for the share `least` of each.
 
-    allowed (c,): which may be chosen; basis (m, b): orthonormal columns that are chosen already. Returns also
-    {number: combination (k,) of the chosen before it} of the columns that are not chosen.
+    Those are chosen of which more than that share is independent of the chosen ones before. Then one that others nearly
+    make up for is exchanged for a column of which it is a small part: two parameters that move the readings nearly
+    alike would have to be many times as large as the errors that they stand for, where they are not linear (the search
+    for a large volume of Goreinov et al., How to find a good submatrix, in: Matrix Methods, World Scientific 2010).
+    allowed (c,): which may be chosen; ranks (c,): a column is exchanged for none of higher rank, all alike by default;
+    basis (m, b): orthonormal columns that are chosen already. Returns also {number: combination (k,) of the chosen} of
+    the columns that are not chosen.
     """
-    basis, chosen, combined = np.zeros((len(columns), 0)) if basis is None else basis, [], {}
-    for number, column in enumerate(columns.T):
-        left = column - basis @ (basis.T @ column)
-        left -= basis @ (basis.T @ left)
-        size = np.linalg.norm(column)
-        if allowed[number] and size > least and np.linalg.norm(left) > least * size:
+    start, chosen = np.zeros((len(columns), 0)) if basis is None else basis, []
+    basis, size = start, np.linalg.norm(columns, axis=0)
+    may, rank = np.asarray(allowed) & (size > least), np.asarray(ranks or np.zeros(len(size)))
+    for number in np.flatnonzero(may).tolist():
+        left = columns[:, number]
+        for _ in range(2):
+            left = left - basis @ (basis.T @ left)
+        if np.linalg.norm(left) > least * size[number]:
             basis = np.column_stack([basis, left / np.linalg.norm(left)])
             chosen.append(number)
-        else:
-            combined[number] = np.linalg.lstsq(columns[:, chosen], column, rcond=None)[0]
-    return chosen, combined
+    left, size = columns - start @ (start.T @ columns), np.maximum(size, least)
+    while True:
+        others = [number for number in range(len(size)) if number not in chosen]
+        combined = np.linalg.lstsq(left[:, chosen], left[:, others], rcond=None)[0]
+        shares = np.abs(combined) * size[chosen][:, None] / size[others]
+        shares[(rank[others] > rank[chosen][:, None]) | ~may[others]] = 0.0
+        out, new = np.unravel_index(shares.argmax(), shares.shape) if shares.size else (0, 0)
+        if not shares.size or shares[out, new] <= _MOST_OF_ANOTHER:
+            return chosen, dict(zip(others, combined.T, strict=True))
+        chosen = sorted([*chosen[:out], *chosen[out + 1 :], others[new]])
 
 
 def in_words(combination: FloatArray, names: Sequence[str]) -> str:

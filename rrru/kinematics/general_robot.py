@@ -104,9 +104,10 @@ class GeneralRobot(Robot):
         names = {candidate.name for candidate in wanted}
         names &= set(self.among or names)
         allowed = [candidate.name in names for candidate in candidates]
-        chosen, combined = choose(columns.reshape(-1, len(sizes)) * sizes, allowed, least)
+        ranks = [candidate.rank for candidate in candidates]
+        chosen, combined = choose(columns.reshape(-1, len(sizes)) * sizes, allowed, least, ranks)
         replaced = {
-            candidates[number].name: combination * sizes[chosen[: len(combination)]] / sizes[number]
+            candidates[number].name: combination * sizes[chosen] / sizes[number]
             for number, combination in combined.items()
         }
         return tuple(candidates[k] for k in chosen), replaced
