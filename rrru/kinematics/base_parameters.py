@@ -25,7 +25,7 @@ class Candidate:
     """A geometric parameter.
 
     name, unit ("mm", "rad"); leg: number of its drive, 0 for none; twists: by site the (6,) of a unit; late: whether it
-    stands only for what no other parameter does.
+    represents only what no other parameter does.
     """
 
     name: str
@@ -176,11 +176,11 @@ def choose(
     ranks: Sequence[int] = (),
     basis: FloatArray | None = None,
 ) -> tuple[list[int], dict[int, FloatArray]]:
-    """Numbers of columns (m, c), in order, that represent all others but for the share `least` of each.
+    """Numbers of columns (m, c), in order, that represent all others except the share `least` of each.
 
     Those are chosen of which more than that share is independent of the chosen ones before. Then one that others nearly
     make up for is exchanged for a column of which it is a small part: two parameters that move the readings nearly
-    alike would have to be many times as large as the errors that they stand for, where they are not linear (the search
+    alike would have to be many times as large as the errors that they represent, where they are not linear (the search
     for a large volume of Goreinov et al., How to find a good submatrix, in: Matrix Methods, World Scientific 2010).
     allowed (c,): which may be chosen; ranks (c,): a column is exchanged for none of higher rank, all alike by default;
     basis (m, b): orthonormal columns that are chosen already. Returns also {number: combination (k,) of the chosen} of
