@@ -15,7 +15,7 @@ _LOST = {"rad": 0.6, "mm": 100.0}
 # millimetre, as parts and frames have, the others leave five micrometres at most. With 0.002 the hardly determined
 # parameters of a hexapod had twice the stated errors
 LEFT_OF_DATA = 5e-3
-# largest part of a chosen parameter in one that is not chosen, both of one size; assumed
+# largest coefficient of a chosen column in the combination of one that is not chosen, both of one length; assumed
 _MOST_OF_ANOTHER = 2.0
 _AXES = ("x", "y", "z", "rx", "ry", "rz")
 
@@ -178,10 +178,11 @@ def choose(
 ) -> tuple[list[int], dict[int, FloatArray]]:
     """Numbers of columns (m, c), in order, that represent all others except the share `least` of each.
 
-    Those are chosen of which more than that share is independent of the chosen ones before. Then one that others nearly
-    make up for is exchanged for a column of which it is a small part: two parameters that move the readings nearly
-    alike would have to be many times as large as the errors that they represent, where they are not linear (the search
-    for a large volume of Goreinov et al., How to find a good submatrix, in: Matrix Methods, World Scientific 2010).
+    Those are chosen of which more than that share is independent of the chosen ones before. Then one is exchanged for
+    another in whose combination it has a coefficient above 2, both of one length. Two parameters that move the readings
+    nearly alike would be many times as large as the errors that they represent, where they are not linear. This is the
+    search for a large volume of Goreinov et al., How to find a good submatrix, in: Matrix Methods, World Scientific
+    2010.
     allowed (c,): which may be chosen; ranks (c,): a column is exchanged for none of higher rank, all alike by default;
     basis (m, b): orthonormal columns that are chosen already. Returns also {number: combination (k,) of the chosen} of
     the columns that are not chosen.
