@@ -1,5 +1,6 @@
 """Pages of own robots judged sentence by sentence: what is judged against; every judge can say true and false."""
 
+import mujoco
 import numpy as np
 import pandas as pd
 import pytest
@@ -374,6 +375,24 @@ def test_every_kind_is_the_robot_that_its_file_says(tmp_path):
             assert tuple(read.parts.columns) == robot.columns and found.closed.all()
             np.testing.assert_allclose(found.position_mm, place, atol=1e-6)
             np.testing.assert_allclose(found.turn, turn, atol=1e-9)
+
+
+def test_reflectors_and_the_tool_stand_where_the_corrected_file_has_its_sites(tmp_path):
+    """The places that were stated are those of the platform as it was drawn."""
+    from rrru.formats.file_changes import Found
+    from rrru.formats.mjcf_writer import to_mjcf
+    from rrru.studies.blind_validation.sentences.truth import measured_points
+
+    turned = np.array([0.1, -0.2, 0.3, 0.0, 0.0, 0.002])
+    places = {"reflector a": np.array([60.0, 0.0, 40.0])}
+    text, _ = to_mjcf("data/models/hexapod.xml", "plate", Found(twists={"tool": turned}, reflectors=places), tmp_path)
+    file = tmp_path / "corrected.xml"
+    file.write_text(text, encoding="utf-8")
+    model = mujoco.MjModel.from_xml_path(str(file))
+    sites = {model.site(k).name: 1e3 * model.site_pos[k] for k in range(model.nsite)}
+    tool, reflector = measured_points({"": (0.0, 0.0, 0.0), "a": (60.0, 0.0, 40.0)}, sites)
+    np.testing.assert_allclose(tool, turned[:3], atol=1e-9)
+    np.testing.assert_allclose(reflector, [60.1, -0.2 + 60.0 * 0.002, 40.3], atol=2e-4)
 
 
 @pytest.mark.parametrize(

@@ -220,11 +220,20 @@ def _of_files(draw, run, exact, fresh):
         if key == "file" and draw.kind == "mjcf" and joint_effects and (loops or _has_play(file)):
             continue
         place, turn, sites = file_poses(file, draw, draw.stops.drive, draw.stops.payload_kg)
-        points = [sites.get(name, np.array(at)) if key == "file" else np.array(at) for name, at in draw.targets.items()]
+        points = measured_points(draw.targets, sites)
         seen = np.stack([place + turn @ point for point in points], axis=1).reshape(-1, 3)
         left = (read - seen[~fresh])[right]
         result |= {f"{key}_mm": _rms((measured - seen)[fresh]), f"{key}_read_mm": _rms(left)}
     return result
+
+
+def measured_points(targets, sites):
+    """Points (3,) on the platform of a file that its sites give for targets, as stated where there is none.
+
+    A corrected MJCF has a site for each reflector, and for the tool where it was found elsewhere than stated.
+    """
+    names = {name: f"reflector {name}" if name else "measured_tool" for name in targets}
+    return [sites.get(names[name], np.array(at)) for name, at in targets.items()]
 
 
 def _of_drives(draw, run):
