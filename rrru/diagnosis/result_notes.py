@@ -129,11 +129,14 @@ def mass_notes(problem: DiagnosisProblem) -> Iterator[str]:
 
 
 def mounting_notes(inference: InferenceResult) -> Iterator[str]:
-    """The sentence that the direction of gravity is assumed, where an effect of the model depends on it."""
-    effects = inference.problem.effects
-    if not inference.problem.mechanism.up_stated and any(
-        is_compliance(effects[name]) for name, _ in inference.state.effects if name in effects
-    ):
+    """The sentence that the direction of gravity is assumed, where an effect of the model depends on it.
+
+    Where something is unexplained it may be such an effect under another direction.
+    """
+    effects, posterior = inference.problem.effects, inference.posterior
+    unexplained = posterior.probability_unexplained > OPTIONS.min_unexplained_probability
+    names = effects if unexplained else [name for name, _ in inference.state.effects if name in effects]
+    if not inference.problem.mechanism.up_stated and any(is_compliance(effects[name]) for name in names):
         yield MOUNTING_ASSUMED
 
 

@@ -98,7 +98,8 @@ def _causes(facts: Facts) -> list[str]:
     single = [effect for effect in single if effect["name"] not in small]
     of_gap = [" of the gap"] + [""] * len(single)
     said += [_cause(effect, of, with_shares, facts) for effect, of in zip(single, of_gap, strict=False)]
-    said += [_of_group(group, with_shares) for name, group in groups.items() if name not in small]
+    firsts = {effect["name"]: effect for effect in facts["effects"]}
+    said += [_of_group(group, firsts[name], with_shares, facts) for name, group in groups.items() if name not in small]
     if not with_shares and said:
         small = facts["gap_rms_mm"] <= facts["noise_rms_mm"]
         why = "The gap is too small relative to the noise" if small else "The effects are confounded with each other"
@@ -187,14 +188,14 @@ def _by_share(facts: Facts, groups: Mapping[str, Facts], small: Collection[str])
     return f"Causes by their share of the gap: {', '.join(words)}."
 
 
-def _of_group(group: Facts, with_shares: bool) -> str:
-    """Confounded causes of which one acts."""
+def _of_group(group: Facts, first: Facts, with_shares: bool, facts: Facts) -> str:
+    """Confounded causes of which one acts, and the first of them as the corrected model has it."""
     names = [readable(name) for name in group["names"]]
     listed = ", ".join(f"{name} {probability(p)}" for name, p in zip(names, group["probabilities"], strict=True))
     share = f"; together they make {small_percent(group['share'])} of the gap" if with_shares else ""
     return (
         f"One of these acts, and these data cannot tell which: {listed} (probability that one does: "
-        f"{probability(group['probability'])}){share}. The corrected model has {names[0]}."
+        f"{probability(group['probability'])}){share}. The corrected model has {_name_and_sizes(first, facts)[0]}."
     )
 
 
@@ -223,6 +224,14 @@ def _cause(effect: Facts, follow: str, with_shares: bool, facts: Facts) -> str:
     if effect["share"] is not None:
         share = f"{capitalized(share_with_interval(effect, follow))} is"
         share = share if with_shares else f"{rounded(effect['rms_mm'])} mm is"
+    name, unsized = _name_and_sizes(effect, facts)
+    meaning = f": {effect['meaning']}" if effect["meaning"] else ""
+    said = f"{share} {name}{meaning}.{_worst(effect['worst_places'])}"
+    return f"{said} {_NO_SIZE}" if unsized else said
+
+
+def _name_and_sizes(effect: Facts, facts: Facts) -> tuple[str, bool]:
+    """Name, leg and sizes of an effect, and whether no size is determined for want of masses."""
     # several have their numbers in the table
     place = f" {effect['place']}" if effect["legs"].isdigit() else ""
     parameters = effect["parameters"]
@@ -232,14 +241,10 @@ def _cause(effect: Facts, follow: str, with_shares: bool, facts: Facts) -> str:
         # only where the weight of the links has parameters of its own is a compliance not a multiple of it
         parameters = per_load if len(per_load) < len(parameters) else []
     sizes = _sizes(parameters)
-    unsized = massless and not sizes
     many = len(sizes) > OPTIONS.max_listed_numbers
     # the coefficients of a function say less than its largest value, which follows
-    sizes = [] if many and effect["worst_places"] else [f"{len(sizes)} numbers"] if many else sizes
-    size = "".join(f", {one}" for one in sizes)
-    meaning = f": {effect['meaning']}" if effect["meaning"] else ""
-    said = f"{share} {readable(effect['name'])}{place}{size}{meaning}.{_worst(effect['worst_places'])}"
-    return f"{said} {_NO_SIZE}" if unsized else said
+    listed = [] if many and effect["worst_places"] else [f"{len(sizes)} numbers"] if many else sizes
+    return "".join([readable(effect["name"]), place, *(f", {one}" for one in listed)]), massless and not sizes
 
 
 def _worst(places: Sequence[Facts]) -> str:

@@ -30,6 +30,8 @@ _BEFORE_DRIVES, _AFTER_DRIVES = ("run", "point", "time_s"), ("speed_mm_s", "payl
 
 # words in the name of a column of distances: a draw-wire encoder, a ballbar, a tape
 _DISTANCES = {"distance", "distances", "dist", "length", "ballbar", "wire", "abstand", "distanz", "laenge", "länge"}
+# why a coordinate is needed where another one was measured
+_ALL_COORDINATES = ", since a reading needs all three coordinates (a height alone is not read)"
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 _DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+([eE][+-]?\d+)?", re.ASCII)
@@ -94,7 +96,7 @@ def resolve(
     spare = {ours: theirs for theirs, ours in meant.items() if ours in drives and theirs in extra}
     only_drives = bool(set(drives) & {*found, *spare}) and not set(COMMAND) & set(found)
     listed = ", ".join(name for name in names if name not in cells.added)
-    alone = distances_alone(found, extra)
+    alone, some_measured = distances_alone(found, extra), bool(set(MEASURED) & set(found))
     if alone:
         points = "of each stop from three or more fixed points (multilateration), and write them as measured_x_mm .."
         allowed = f"all three coordinates of each reading: compute them from the distances {points}"
@@ -103,7 +105,8 @@ def resolve(
         if alone and ours in MEASURED:
             continue
         if ours not in found and ((ours in REQUIRED and not (only_drives and ours in COMMAND)) or ours in spec.columns):
-            allowed = f"a column {theirs}{_advice(ours, _nearest(theirs, extra))}; the file has {listed}"
+            why = _ALL_COORDINATES if ours in MEASURED and some_measured else ""
+            allowed = f"a column {theirs}{why}{_advice(ours, _nearest(theirs, extra))}; the file has {listed}"
             problems.add("missing column", column=theirs, value="no such column", allowed=allowed)
     for group in (tuple(drives), *_GROUPS):
         given, lacking = [found[name] for name in group if name in found], [name for name in group if name not in found]
@@ -122,7 +125,7 @@ def resolve(
             value, allowed = "columns that look like the drives' values", f"columns: {{{pairs}}}{unit}"
             problems.add("drives", column=", ".join(spare.values()), value=value, allowed=allowed)
         for name in dict.fromkeys(extra):
-            if meant.get(name) in spare:
+            if meant.get(name) in spare or name in alone:
                 continue
             shown = name or f"(no name, column {names.index(name) + 1}; pandas writes its index so)"
             advice = _advice(_nearest(name, unused), name)

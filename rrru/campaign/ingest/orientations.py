@@ -29,8 +29,9 @@ def check_orientations(frame: pd.DataFrame, found: Mapping[str, str], problems: 
             frame = _from_quaternions(frame, columns, quaternion, found, problems)
         elif set(columns) <= set(frame):
             size = np.linalg.norm(frame[[*columns]], axis=1)
+            allowed = "a rotation vector in rad of at most one turn: convert degrees and Euler angles"
             for i in np.flatnonzero(size > _LONGEST_RAD).tolist():
-                _note(problems, frame, i, [found[one] for one in columns], f"{size[i]:.6g} rad", "at most one turn")
+                _note(problems, frame, i, [found[one] for one in columns], f"{size[i]:.6g} rad", allowed)
     return frame
 
 

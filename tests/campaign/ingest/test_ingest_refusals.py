@@ -152,7 +152,8 @@ def test_a_missing_column_lists_those_of_the_file_alone(tmp_path):
     """`trajectory`, which is added to a file without one, is not among them."""
     lacking = FIELD.drop(columns=["run", "trajectory", "point", "measured_x_mm"])
     problems = problems_of(lacking, tmp_path)
-    allowed = f"a column measured_x_mm; the file has {', '.join(lacking.columns)}"
+    why = "since a reading needs all three coordinates (a height alone is not read)"
+    allowed = f"a column measured_x_mm, {why}; the file has {', '.join(lacking.columns)}"
     assert [problem["allowed"] for problem in problems] == [allowed]
 
 
@@ -229,6 +230,22 @@ ROWS = {
         "Distance [mm]",
         "distances, which are not read",
         "from three or more fixed points",
+    ),
+    "heights alone": (
+        FIELD.drop(columns=["measured_x_mm", "measured_y_mm"]),
+        {},
+        None,
+        "measured_x_mm",
+        "no such column",
+        "a reading needs all three coordinates (a height alone is not read)",
+    ),
+    "orientations in degrees": (
+        FIELD.assign(**{f"measured_r{axis}_rad": 30.0 for axis in "xyz"}),
+        {},
+        1,
+        "measured_rx_rad, measured_ry_rad, measured_rz_rad",
+        "51.9615 rad",
+        "a rotation vector in rad of at most one turn: convert degrees and Euler angles",
     ),
     "a misspelt column": (
         TEXT.replace("measured_x", "mesured_x"),
@@ -590,3 +607,10 @@ def test_another_unit_in_a_header_is_not_read_as_ours(ours, header, unit, tmp_pa
     with pytest.raises(IngestError, match=f"{unit}: convert the column") as raised:
         ingest(spec, ROBOT)
     assert header in str(raised.value)
+
+
+def test_distances_are_refused_once(tmp_path):
+    """To leave them out, as the message on an undeclared column said, leaves nothing that was measured."""
+    frame = FIELD.drop(columns=MEASURED).assign(wire_1_mm=812.5, wire_2_mm=640.0)
+    (problem,) = problems_of(frame, tmp_path)
+    assert problem["column"] == "wire_1_mm, wire_2_mm" and problem["value"] == "distances, which are not read"
