@@ -185,12 +185,14 @@ def _poses(
     passes = poses.passes(problem.measurements, problem.mechanism)
     if not len(passes):
         return best
-    stated_speed, own_load = (float(problem.measurements[name].median()) for name in ("speed_mm_s", "payload_kg"))
+    stated_speed, payload = float(problem.measurements["speed_mm_s"].median()), _payloads(problem.measurements)
     own_speed = stated_speed if np.isfinite(stated_speed) else _speed(problem.measurements)
-    last_s, own_load, most = _end_s(problem.measurements), float(np.nan_to_num(own_load)), 0.0
+    # one that was carried
+    own_load = float(np.quantile(payload, 0.5, method="higher"))
+    last_s, most = _end_s(problem.measurements), 0.0
     for fast, loaded in _harder(problem, pair):
         speed = limits.fast(stated_speed, np.full(1, np.nan)) if fast else own_speed
-        load = limits.loaded_kg(own_load) if loaded else own_load
+        load = limits.loaded_kg(float(payload.max())) if loaded else own_load
         if (fast and not (speed > stated_speed and np.isfinite(last_s))) or (loaded and not load > own_load):
             continue
         # passes at which a drive would be too fast are left out
@@ -238,6 +240,11 @@ def _end_s(frame: pd.DataFrame) -> float:
     return np.nanmax(frame["time_s"].to_numpy(dtype=float)) if frame["time_s"].notna().any() else np.nan
 
 
+def _payloads(frame: pd.DataFrame) -> FloatArray:
+    """Payloads (n,) in kg of a measurement table, none where it is unknown."""
+    return np.asarray(np.nan_to_num(frame["payload_kg"].to_numpy(dtype=float)))
+
+
 def _speed(frame: pd.DataFrame) -> float:
     """Speed in mm/s between the points of a measurement table, by its times; NaN where it has none."""
     way = np.linalg.norm(np.diff(rows.command(frame), axis=0), axis=1)
@@ -262,13 +269,14 @@ def candidates(frame: pd.DataFrame, limits: RunLimits | None = None) -> tuple[li
     for name in chosen:
         first = frame[frame["trajectory"] == name]
         first = first[first["run"] == first["run"].iloc[0]]
-        own_speed, own_load = float(first["speed_mm_s"].iloc[0]), float(np.nan_to_num(first["payload_kg"].iloc[0]))
+        own_speed, own_load = float(first["speed_mm_s"].iloc[0]), float(_payloads(first).max())
         fastest, heaviest = limits.fast(own_speed, _rates(first, limits.columns)), limits.loaded_kg(own_load)
         for reverse, fast, loaded in _KINDS:
             if (fast and not (fastest > own_speed and np.isfinite(end))) or (loaded and not heaviest > own_load):
                 continue
             speed, load = fastest if fast else own_speed, heaviest if loaded else own_load
-            table = _pass(first, len(tables) + 1, end + OPTIONS.pause_between_runs_s, reverse, speed, load)
+            carried = first.assign(payload_kg=heaviest if loaded else _payloads(first))
+            table = _pass(carried, len(tables) + 1, end + OPTIONS.pause_between_runs_s, reverse, speed)
             if not limits.allows(speed, load, _seconds(table)):
                 continue
             tables.append(table)
@@ -295,10 +303,8 @@ def _seconds(run: pd.DataFrame) -> float:
     return float(way / run["speed_mm_s"].iloc[0])
 
 
-def _pass(
-    first: pd.DataFrame, number: int, start_s: float, reverse: bool, speed_mm_s: float, payload_kg: float
-) -> pd.DataFrame:
-    """Table of one more pass along the points of a run."""
+def _pass(first: pd.DataFrame, number: int, start_s: float, reverse: bool, speed_mm_s: float) -> pd.DataFrame:
+    """Table of one more pass along the points of a run, with its payloads."""
     run = (first.iloc[::-1] if reverse else first).reset_index(drop=True)
     clock = first["time_s"].to_numpy(dtype=float)
     time = clock[-1] - clock[::-1] if reverse else clock - clock[0]
@@ -307,5 +313,5 @@ def _pass(
         # the same profile, driven faster: the average speed over the run rises in proportion
         time = time * own_speed / speed_mm_s
     measured = rows.vector_columns("measured", rows.command(run))
-    planned = {"run": number, "time_s": start_s + time, "speed_mm_s": speed_mm_s, "payload_kg": payload_kg}
+    planned = {"run": number, "time_s": start_s + time, "speed_mm_s": speed_mm_s}
     return run.assign(**planned, status="ok", **measured)

@@ -72,6 +72,19 @@ def test_stated_limits_are_what_is_proposed_and_never_exceeded(line):
     assert candidates(line, _limits(line, speed_mm_s=50.0))[0] == []
 
 
+def test_a_run_whose_payload_changes_is_driven_again_with_its_payloads_and_loaded_with_more(line):
+    """Payloads were the first point's: without one and then with 6 kg, 5 kg were proposed."""
+    carried = np.where(np.arange(len(line)) < len(line) // 2, 0.0, 1.0)
+    choice, table = candidates(line.assign(payload_kg=carried), _limits(line))
+    for number, run in enumerate(choice, 1):
+        planned = table.loc[table["run"] == number, "payload_kg"].to_numpy()
+        if "payload" in run["run"]:
+            assert run["payload_kg"] == 6.0 and (planned == 6.0).all()
+        else:
+            assert run["payload_kg"] == 1.0
+            np.testing.assert_array_equal(planned, carried[::-1] if run["reverse"] else carried)
+
+
 def test_a_run_that_takes_longer_than_allowed_is_not_proposed(line):
     seconds = float(np.ptp(line["time_s"]))
     fast, table = candidates(line, _limits(line, minutes=0.5 * seconds / 60.0))
