@@ -99,7 +99,9 @@ def _causes(facts: Facts) -> list[str]:
     of_gap = [" of the gap"] + [""] * len(single)
     said += [_cause(effect, of, with_shares, facts) for effect, of in zip(single, of_gap, strict=False)]
     firsts = {effect["name"]: effect for effect in facts["effects"]}
-    said += [_of_group(group, firsts[name], with_shares, facts) for name, group in groups.items() if name not in small]
+    said += [
+        _of_group(group, firsts.get(name), with_shares, facts) for name, group in groups.items() if name not in small
+    ]
     if not with_shares and said:
         small = facts["gap_rms_mm"] <= facts["noise_rms_mm"]
         why = "The gap is too small relative to the noise" if small else "The effects are confounded with each other"
@@ -188,14 +190,15 @@ def _by_share(facts: Facts, groups: Mapping[str, Facts], small: Collection[str])
     return f"Causes by their share of the gap: {', '.join(words)}."
 
 
-def _of_group(group: Facts, first: Facts, with_shares: bool, facts: Facts) -> str:
-    """Confounded causes of which one acts, and the first of them as the corrected model has it."""
+def _of_group(group: Facts, first: Facts | None, with_shares: bool, facts: Facts) -> str:
+    """Confounded causes of which one acts; first: of them, as the corrected model has it, None where it has not."""
     names = [readable(name) for name in group["names"]]
     listed = ", ".join(f"{name} {probability(p)}" for name, p in zip(names, group["probabilities"], strict=True))
     share = f"; together they make {small_percent(group['share'])} of the gap" if with_shares else ""
+    corrected = f" The corrected model has {_name_and_sizes(first, facts)[0]}." if first else ""
     return (
         f"One of these acts, and these data cannot tell which: {listed} (probability that one does: "
-        f"{probability(group['probability'])}){share}. The corrected model has {_name_and_sizes(first, facts)[0]}."
+        f"{probability(group['probability'])}){share}.{corrected}"
     )
 
 

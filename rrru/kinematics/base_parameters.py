@@ -176,7 +176,7 @@ def choose(
     ranks: Sequence[int] = (),
     basis: FloatArray | None = None,
 ) -> tuple[list[int], dict[int, FloatArray]]:
-    """Numbers of columns (m, c), in order, that represent all others except the share `least` of each.
+    """Numbers of columns (m, c), in order, that represent all others except about the share `least` of each.
 
     Those are chosen of which more than that share is independent of the chosen ones before. Then one is exchanged for
     another in whose combination it has a coefficient above 2, both of one length. Two parameters that move the readings

@@ -23,7 +23,7 @@ def _file_of(seed):
 
 
 @pytest.mark.parametrize("up", [(1.0, 0.0, 0.0), None])
-def test_what_no_effect_explains_may_be_one_under_another_gravity(up):
+def test_what_no_effect_explains_may_be_one_with_gravity_in_another_direction(up):
     """Stated, the mounting gives the compliance; without it the answer was "unexplained" and did not mention it."""
     robot = rrru.load_robot(str(ARM), tip="tool0", **({"up": up} if up else {}))
     campaign = rrru.read_campaign(_file_of(1), robot, noise_mm=numpy_arm.NOISE_MM, frame="register")

@@ -256,6 +256,15 @@ def test_confounded_causes_are_one_sentence_with_their_probabilities():
     jsonschema.validate(json.loads(json.dumps(facts_of)), SCHEMA)
 
 
+def test_a_group_whose_first_cause_was_not_fitted_says_nothing_of_the_corrected_model():
+    causes = synthetic_gap.gap_attribute(CAMPAIGN)
+    grouped = causes["effect"].isin(["link_flexure", "servo_lag"])
+    causes.loc[grouped, ["decision", "group_probability"]] = "group", 0.97
+    said = answered(effects="backlash", groups="link_flexure | servo_lag", causes=causes)["sentences"]
+    (group,) = [one for one in said if one.startswith("One of these acts")]
+    assert "link flexure 0.98, servo lag 0.02" in group and "corrected model" not in group
+
+
 def test_a_small_group_is_counted_and_has_no_sentence():
     causes = synthetic_gap.gap_attribute(CAMPAIGN)
     grouped = causes["effect"].isin(["backlash", "servo_lag"])

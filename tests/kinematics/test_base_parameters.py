@@ -62,7 +62,7 @@ def _tool(chain, errors, drives):
 
 
 @pytest.mark.parametrize("angle", np.linspace(0.0, np.pi, 9) + 0.1)
-def test_a_tool_beside_the_last_axis_is_found_wherever_it_stands(angle, tmp_path):
+def test_a_tool_off_the_last_axis_is_calibrated_in_every_direction(angle, tmp_path):
     """The zero of this drive moves it across, and the two parameters of its place nearly all of it.
 
     At 0.1 rad that zero and the place across were chosen: 0.185 mm were left of readings with noise of 0.01 mm.

@@ -187,7 +187,7 @@ def _poses(
         return best
     stated_speed, payload = float(problem.measurements["speed_mm_s"].median()), _payloads(problem.measurements)
     own_speed = stated_speed if np.isfinite(stated_speed) else _speed(problem.measurements)
-    # one that was carried
+    # a payload that was carried: the median may lie between two
     own_load = float(np.quantile(payload, 0.5, method="higher"))
     last_s, most = _end_s(problem.measurements), 0.0
     for fast, loaded in _harder(problem, pair):
@@ -241,7 +241,7 @@ def _end_s(frame: pd.DataFrame) -> float:
 
 
 def _payloads(frame: pd.DataFrame) -> FloatArray:
-    """Payloads (n,) in kg of a measurement table, none where it is unknown."""
+    """Payloads (n,) in kg of a measurement table, 0 where it is unknown."""
     return np.asarray(np.nan_to_num(frame["payload_kg"].to_numpy(dtype=float)))
 
 

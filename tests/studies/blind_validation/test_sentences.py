@@ -377,7 +377,7 @@ def test_every_kind_is_the_robot_that_its_file_says(tmp_path):
             np.testing.assert_allclose(found.turn, turn, atol=1e-9)
 
 
-def test_reflectors_and_the_tool_stand_where_the_corrected_file_has_its_sites(tmp_path):
+def test_reflectors_and_the_tool_are_at_the_sites_of_the_corrected_file(tmp_path):
     """The places that were stated are those of the platform as it was drawn."""
     from rrru.formats.file_changes import Found
     from rrru.formats.mjcf_writer import to_mjcf
