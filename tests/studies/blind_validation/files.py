@@ -23,7 +23,7 @@ def conditions(file):
 
 
 class Short(FileRobot):
-    """A robot that drives one slanting line to and fro, and once more loaded: nine points."""
+    """A robot that drives one slanting line to and fro, and once more loaded: nine points by default."""
 
     def plan(self, conditions):
         """Three passes."""
@@ -31,11 +31,16 @@ class Short(FileRobot):
         return make_plan(from_config(self.trajectories), passes, **conditions.motion)
 
 
-def short(plant, file, acting=(), offsets=None):
-    """A Short robot of a file on a plant."""
+def short(plant, file, acting=(), offsets=None, across_mm=(0.0,), points=3):
+    """A Short robot of a file on a plant; its line, of so many points, may be driven at several places across."""
     known = conditions(file)
     home, reach = known.mechanism.legs.home_mm, 0.4 * known.model.half_mm
     ends = home + reach * np.array([[-1.0, 0.0, -1.0], [1.0, 0.3, 0.5]])
-    lines = {"start_mm": ends[0].tolist(), "end_mm": ends[1].tolist(), "offsets_y_mm": [0.0], "points": 3}
+    lines = {
+        "start_mm": ends[0].tolist(),
+        "end_mm": ends[1].tolist(),
+        "offsets_y_mm": list(across_mm),
+        "points": points,
+    }
     offsets = offsets or (0.0,) * len(known.mechanism.parts.columns)
     return Short("short", file, plant, {"lines": lines}, offsets, acting)
