@@ -1,15 +1,14 @@
 """Result of an estimation: values, covariance by name, residuals, rank and null space."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import product
 from typing import Self
 
 import numpy as np
 from scipy.linalg import solve_triangular
 
-from rrru.arrays import BoolArray, FloatArray
+from rrru.arrays import BoolArray, FloatArray, IntArray
 from rrru.estimation.intervals import QUANTILE_95, NormalMixture
 from rrru.estimation.parameters import Parameters
 from rrru.estimation.problem import Problem
@@ -46,6 +45,8 @@ class Estimate:
     values (p,); covariance (p, p): of the posterior, linearised at the values, zero for a parameter at a bound and inf
     on the diagonal of one that neither readings nor prior determine; at_bound (p,): which parameters a bound holds;
     end: how the search ended.
+    cases: of a prior that is a mixture, the posterior probability and the Estimate of each case that counts. Covariance
+    and intervals are those of this mixture.
     """
 
     problem: Problem
@@ -53,18 +54,26 @@ class Estimate:
     covariance: FloatArray
     at_bound: BoolArray
     end: SearchEnd
+    cases: tuple[tuple[float, Self], ...] = ()
 
     @classmethod
     def at(cls, problem: Problem, values: FloatArray, white: FloatArray, free: BoolArray, end: SearchEnd) -> Self:
         """The Estimate at values (p,) from whitened derivative and residual (n, p + 1) there.
 
         free (p,): parameters that no bound holds.
-
-        Where a prior is a mixture the values move to the mean over its components, each weighted by its evidence on
-        the linearisation, and the covariance is that of the mixture.
         """
-        moved, covariance, _ = _over_mixtures(white, problem.parameters, values, free)
-        return cls(problem, problem.parameters.clipped(values + moved), covariance, ~free, end)
+        parameters = problem.parameters
+        _, covariance = _posterior(white, parameters.sd, parameters.mean - values, free)
+        return cls(problem, values, covariance, ~free, end)
+
+    @classmethod
+    def over_cases(cls, whole: Self, cases: Sequence[tuple[float, Self]]) -> Self:
+        """The Estimate with values and end of `whole` and the covariance of a mixture of `Estimate.cases`."""
+        share, means = np.array([share for share, _ in cases]), np.array([one.values for _, one in cases])
+        apart = means - share @ means
+        spread = sum(share * one.covariance for share, one in cases)
+        covariance = spread + np.einsum("c,ci,cj->ij", share, apart, apart)
+        return replace(whole, covariance=covariance, cases=tuple(cases))
 
     @cached_property
     def readings_triangle(self) -> FloatArray:
@@ -114,7 +123,7 @@ class Estimate:
         unit vector the readings do not determine; NaN where there is no variance.
         """
         precision = np.zeros(len(self.values))
-        precision[priors] = self.parameters.prior_precision(self.values)[priors]
+        precision[priors] = self.parameters.prior_precision[priors]
         variance = np.diag(self.covariance)
         known = (variance > 0.0) & np.isfinite(variance)
         covariance = self.covariance[np.ix_(known, known)]
@@ -132,21 +141,30 @@ class Estimate:
         half = QUANTILE_95 * np.sqrt(np.diag(self.covariance))
         result, parameters = np.stack([self.values - half, self.values + half], axis=1), self.parameters
         cut = (result[:, 0] < parameters.low) | (result[:, 1] > parameters.high)
-        mixed = np.isfinite(parameters.wide_sd).any()
-        for held in [None, *np.flatnonzero(self.at_bound)]:
-            free = ~self.at_bound
-            if held is None:
-                chosen = np.flatnonzero(free & (cut | mixed) & np.isfinite(half))
-            else:
-                free[held], chosen = True, np.array([held])
-            if not len(chosen):
-                continue
-            *_, found = _over_mixtures(self.readings_triangle, parameters, self.values, free)
-            for k in chosen[np.isfinite(found.sd[:, chosen]).all(axis=0)]:
-                bounds = parameters.low[k], parameters.high[k]
-                marginal = NormalMixture(found.share, self.values[k] + found.step[:, k], found.sd[:, k])
-                result[k] = marginal.interval(*bounds)
+        chosen = np.flatnonzero((cut | self.at_bound | bool(self.cases)) & np.isfinite(half))
+        cases = self.cases or ((1.0, self),)
+        share, marginals = np.array([share for share, _ in cases]), [one.marginals(chosen) for _, one in cases]
+        means, sds = (np.array(numbers) for numbers in zip(*marginals, strict=True))
+        for place, k in enumerate(chosen):
+            if np.isfinite(sds[:, place]).all():
+                marginal = NormalMixture(share, means[:, place], sds[:, place])
+                result[k] = marginal.interval(parameters.low[k], parameters.high[k])
         return result
+
+    def marginals(self, chosen: IntArray) -> tuple[FloatArray, FloatArray]:
+        """Means and standard deviations (k,) of the linearised posterior of parameters of these numbers (k,).
+
+        Those of a parameter at a bound are without this bound. For a prior that is no mixture.
+        """
+        means, sds = self.values[chosen], np.sqrt(np.diag(self.covariance))[chosen]
+        for place in np.flatnonzero(self.at_bound[chosen]):
+            free, k = ~self.at_bound, chosen[place]
+            free[k] = True
+            off = self.parameters.mean - self.values
+            step, covariance = _posterior(self.readings_triangle, self.parameters.sd, off, free)
+            means[place] += step[k]
+            sds[place] = np.sqrt(covariance[k, k])
+        return means, sds
 
     @cached_property
     def residual(self) -> FloatArray:
@@ -186,7 +204,8 @@ class Estimate:
 
     def scaled(self, factor: float) -> Self:
         """The Estimate under a noise that is larger by a factor, for readings that weigh far more than the prior."""
-        return replace(self, covariance=self.covariance * factor**2)
+        cases = tuple((share, one.scaled(factor)) for share, one in self.cases)
+        return replace(self, covariance=self.covariance * factor**2, cases=cases)
 
 
 def numerical_rank(columns: FloatArray, tolerance: float = 1e-9) -> int:
@@ -234,51 +253,6 @@ def _seen_by_readings(columns: FloatArray, parameters: Parameters) -> tuple[Floa
     _, sizes, directions = np.linalg.svd(columns * scale)
     count = len(scale)
     return np.pad(sizes, (0, count - len(sizes))), directions[:count] * scale
-
-
-@dataclass(frozen=True)
-class _Components:
-    """Components of a posterior: shares (c,), steps to their means (c, p) and standard deviations (c, p)."""
-
-    share: FloatArray
-    step: FloatArray
-    sd: FloatArray
-
-
-def _over_mixtures(
-    white: FloatArray, parameters: Parameters, values: FloatArray, free: BoolArray
-) -> tuple[FloatArray, FloatArray, _Components]:
-    """Step (p,) from the values to the posterior mean, zero without mixtures, covariance (p, p) and components.
-
-    Every component of a mixture is a change D of the wide priors' precision, whose posterior follows from that under
-    the wide ones by the matrix inversion lemma.
-    """
-    mixed = np.flatnonzero(np.isfinite(parameters.wide_sd) & free)
-    sd = np.where(np.isfinite(parameters.wide_sd), parameters.wide_sd, parameters.sd)
-    step, covariance = _posterior(white, sd, parameters.mean - values, free)
-    sds = np.sqrt(np.diag(covariance))
-    if not len(mixed):
-        return np.zeros(len(values)), covariance, _Components(np.ones(1), step[None], sds[None])
-    among_mixed, off = covariance[np.ix_(mixed, mixed)], (parameters.mean - values - step)[mixed]
-    change = parameters.sd[mixed] ** -2.0 - parameters.wide_sd[mixed] ** -2.0
-    ratio = np.log(parameters.wide_sd / parameters.sd)[mixed]
-    logs, means, gains = [], [], []
-    for narrow in product((False, True), repeat=len(mixed)):
-        chosen = np.flatnonzero(narrow)
-        inverse = np.linalg.inv(np.diag(1.0 / change[chosen]) + among_mixed[np.ix_(chosen, chosen)])
-        gain = covariance[:, mixed[chosen]] @ inverse
-        log_determinant = -np.linalg.slogdet(inverse)[1] + np.log(change[chosen]).sum()
-        logs.append(-0.5 * off[chosen] @ inverse @ off[chosen] - 0.5 * log_determinant + ratio[chosen].sum())
-        means.append(step + gain @ off[chosen])
-        gains.append(gain @ covariance[mixed[chosen]])
-    share = np.exp(np.array(logs) - max(logs))
-    share /= share.sum()
-    mean = share @ np.array(means)
-    apart = np.array(means) - mean
-    taken = np.einsum("c,cij->ij", share, np.array(gains))
-    component_sds = np.sqrt([np.maximum(np.diag(covariance - gain), 0.0) for gain in gains])
-    components = _Components(share, np.array(means), component_sds)
-    return mean, covariance - taken + np.einsum("c,ci,cj->ij", share, apart, apart), components
 
 
 def _posterior(white: FloatArray, sd: FloatArray, mean: FloatArray, free: BoolArray) -> tuple[FloatArray, FloatArray]:

@@ -16,7 +16,6 @@ Analysis, 3rd ed., section 14.2). Size and length scale of a smooth discrepancy 
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import product
 from typing import Protocol, runtime_checkable
 
 import numpy as np
@@ -87,7 +86,7 @@ def marginalize(
     one, the noise's determinant is not known, the loss is robust, or no reading is left to determine an unknown noise.
     """
     model = _LinearModel(estimate, tuple(common), noise_known)
-    found = [model.integrate(sd, *grid) for sd in model.prior_components() for grid in model.grid(discrepancy)]
+    found = [model.integrate(case.sd, *grid) for case in estimate.parameters.cases for grid in model.grid(discrepancy)]
     logs = np.array([one.log_evidence for one in found])
     best = found[int(logs.argmax())]
     log = float(logsumexp(logs) - np.log(len(logs)))
@@ -121,15 +120,6 @@ class _LinearModel:
         observations, whiten = self._problem.observations, self._problem.whiten
         columns = whiten(observations.jacobian(self._values)).reshape(-1, len(self._values))
         return np.column_stack([columns, whiten(observations.residual(self._values)).ravel()])
-
-    def prior_components(self) -> Iterator[FloatArray]:
-        """Standard deviations (p,) of the prior, one component of all mixtures after the other."""
-        parameters = self._problem.parameters
-        mixed = np.flatnonzero(np.isfinite(parameters.wide_sd))
-        for case in product((parameters.sd, parameters.wide_sd), repeat=len(mixed)):
-            sd = parameters.sd.copy()
-            sd[mixed] = [sds[place] for sds, place in zip(case, mixed, strict=True)]
-            yield sd
 
     def grid(self, discrepancy: Discrepancy | None) -> Iterator[tuple[FloatArray, float, float]]:
         """Triangles (p + 1, p + 1) of the readings under every discrepancy, half its log determinant, and its size."""

@@ -1,15 +1,16 @@
 """Parameters of an estimation: named blocks, each parameter with its unit, prior and bounds."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import product
 from typing import Self
 
 import numpy as np
 import numpy.typing as npt
-from scipy.special import expit, logsumexp
+from scipy.special import logsumexp
 
-from rrru.arrays import FloatArray
+from rrru.arrays import BoolArray, FloatArray
 from rrru.parameters import ParameterSet
 
 
@@ -21,7 +22,7 @@ class Block:
     mean, sd (k,): of the normal prior, in the parameter's unit; sd inf for a flat one.
     low, high (k,): bounds.
     wide_sd (k,): NaN for a normal prior; else the prior is the mixture of N(mean, sd^2) and N(mean, wide_sd^2) in equal
-        parts.
+        parts. Parameters of one unit have the narrow or the wide one together.
     """
 
     name: str
@@ -118,31 +119,40 @@ class Parameters:
         """The nearest vector (p,) within the bounds."""
         return np.clip(values, self.low, self.high)
 
-    def prior_precision(self, values: FloatArray) -> FloatArray:
-        """Precisions (p,) of normal priors whose costs majorize those of the priors at values (p,), 0 for a flat one.
+    @cached_property
+    def mixed(self) -> BoolArray:
+        """Which parameters (p,) have a prior that is a mixture."""
+        return np.isfinite(self.wide_sd)
 
-        A normal prior's cost, up to a constant, is at least that of the mixture everywhere and equal to it at `values`.
+    @cached_property
+    def cases(self) -> tuple[Self, ...]:
+        """The Parameters with normal priors, all equally probable, of which these are the mixture, narrow ones first.
 
-        For a mixture of normal distributions with one mean: its components' precisions, weighted by their
-        responsibilities (the expectation step of Dempster, Laird and Rubin, 1977).
+        These alone where no prior is a mixture.
         """
+        if not self.mixed.any():
+            return (self,)
+        owners = [(number, unit) for number, block in enumerate(self.blocks) for unit in block.units]
+        groups = list(dict.fromkeys(owner for owner, mixed in zip(owners, self.mixed.tolist(), strict=True) if mixed))
+        result = []
+        for wide in product((False, True), repeat=len(groups)):
+            chosen = {group for group, is_wide in zip(groups, wide, strict=True) if is_wide}
+            sd = np.where(self.mixed & [owner in chosen for owner in owners], self.wide_sd, self.sd)
+            parts = [(block, sd[self.slices[block.name]]) for block in self.blocks]
+            blocks = (replace(block, sd=own, wide_sd=np.full(len(own), np.nan)) for block, own in parts)
+            result.append(replace(self, blocks=tuple(blocks)))
+        return tuple(result)
+
+    @cached_property
+    def prior_precision(self) -> FloatArray:
+        """Precisions (p,) of the priors, 0 for a flat one, of the narrow one of a mixture."""
         with np.errstate(divide="ignore"):
-            result = self.sd**-2.0
-        mixed = np.isfinite(self.wide_sd)
-        narrow, wide = result[mixed], self.wide_sd[mixed] ** -2.0
-        # of the narrow component
-        log_odds = 0.5 * np.log(narrow / wide) - 0.5 * (narrow - wide) * (values - self.mean)[mixed] ** 2
-        responsibility = expit(log_odds)
-        result[mixed] = responsibility * narrow + (1.0 - responsibility) * wide
-        return result
+            return np.asarray(self.sd**-2.0)
 
     def prior_cost(self, values: FloatArray) -> float:
         """Negative log prior density of values (p,), up to a constant."""
-        off = values - self.mean
-        plain = np.isfinite(self.sd) & np.isnan(self.wide_sd)
-        cost = 0.5 * float(((off[plain] / self.sd[plain]) ** 2).sum())
-        mixed = np.isfinite(self.wide_sd)
-        if not mixed.any():
-            return cost
-        sds = np.stack([self.sd[mixed], self.wide_sd[mixed]])
-        return cost - float(logsumexp(-0.5 * (off[mixed] / sds) ** 2 - np.log(sds), axis=0).sum())
+        if self.mixed.any():
+            costs = [case.prior_cost(values) + float(np.log(case.sd[self.mixed]).sum()) for case in self.cases]
+            return -float(logsumexp(-np.array(costs)))
+        known = np.isfinite(self.sd)
+        return 0.5 * float((((values - self.mean)[known] / self.sd[known]) ** 2).sum())

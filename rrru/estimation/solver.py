@@ -10,15 +10,21 @@ second-order correction (geodesic acceleration: Transtrum and Sethna, Improvemen
 arXiv:1201.5885, 2012) and, if need be, a step length by quadratic interpolation: so a search follows the curved valley
 of two factors of one product, such as a compliance and a load. Parameters at a bound that the gradient presses against
 are held (Kanzow, Yamashita and Fukushima, Journal of Computational and Applied Mathematics 172, 2004).
+
+Where priors are mixtures there is a search for each case of them, whose probability is its evidence by Laplace's
+approximation (Tierney and Kadane, Journal of the American Statistical Association 81, 1986). The parameters of these
+priors get their mean over the cases. All others are searched for with these held: of a linear model their posterior
+mean, and of a product of two factors a pair that fits the readings, which the mean of either factor is not.
 """
 
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 from scipy.linalg import solve_triangular
+from scipy.special import logsumexp
 
 from rrru.arrays import BoolArray, FloatArray, IntArray
 from rrru.errors import FitError
@@ -57,6 +63,8 @@ _RETRY_DAMPING = 1e-3
 _DAMPING_DECREASE, _WELL_PREDICTED = 0.1, 0.5
 # least step length, as a share of the step
 _SHORTEST = 0.05
+# least posterior probability of a case of a mixture that counts
+_LEAST_SHARE = 1e-6
 _Function = Callable[[FloatArray], FloatArray]
 # rho(z) and its derivative by z, the squared residual in units of the loss scale (as scipy names them)
 _LOSSES: dict[str, tuple[_Function, _Function]] = {
@@ -80,16 +88,72 @@ def solve(
     at any start, which is outside of what the robot can do.
     """
     options = options or SolverOptions()
+    starts = [problem.parameters.mean] if starts is None else list(starts)
+    if problem.parameters.mixed.any():
+        return _solve_cases(problem, starts, options)
+    search = _best(problem, starts, options)
+    return search.estimate()
+
+
+def _best(
+    problem: Problem, starts: Iterable[npt.ArrayLike], options: SolverOptions, held: BoolArray | None = None
+) -> "_Search":
+    """The _Search of lowest objective of those from some starts (p,), with the evaluations of all.
+
+    held (p,): parameters that keep their start value. Raises FitError where the model predicts nothing at any start.
+    """
     found = []
-    for start in [problem.parameters.mean] if starts is None else starts:
-        search = _Search(problem, options, problem.parameters.clipped(np.asarray(start, dtype=float)))
+    for start in starts:
+        search = _Search(problem, options, problem.parameters.clipped(np.asarray(start, dtype=float)), held)
         if np.isfinite(search.cost):
             search.run()
             found.append(search)
     if not found:
         raise FitError("the model predicts no reading at the start values; start nearer to the real robot")
     best = min(found, key=lambda one: one.cost)
-    return best.estimate(sum(one.evaluations for one in found))
+    best.evaluations = sum(one.evaluations for one in found)
+    return best
+
+
+def _solve_cases(problem: Problem, starts: Sequence[npt.ArrayLike], options: SolverOptions) -> Estimate:
+    """The Estimate of a problem whose prior is a mixture, see the module; a case starts where the one before ended."""
+    mixed, found = problem.parameters.mixed, list[Estimate]()
+    for parameters in problem.parameters.cases:
+        search = _best(replace(problem, parameters=parameters), starts, options)
+        found.append(search.estimate())
+        starts = [search.values]
+    log = _log_evidences(found, mixed)
+    share = np.exp(log - logsumexp(log))
+    share = np.where(share > _LEAST_SHARE, share, 0.0) / share[share > _LEAST_SHARE].sum()
+    start = found[int(share.argmax())].values.copy()
+    start[mixed] = share @ np.array([one.values[mixed] for one in found])
+    search = _best(problem, [start], options, mixed)
+    ends = [*(one.end for one in found), search.end]
+    end = SearchEnd(
+        all(one.converged for one in ends),
+        all(one.straight for one in ends),
+        next((one.message for one in ends if not one.converged), search.message),
+        search.cost,
+        sum(one.evaluations for one in ends),
+    )
+    at_bound = np.where(mixed, np.all([one.at_bound for one in found], axis=0), ~search.free)
+    cases = [(share, one) for share, one in zip(share.tolist(), found, strict=True) if share]
+    return Estimate.over_cases(Estimate(problem, search.values, cases[0][1].covariance, at_bound, end), cases)
+
+
+def _log_evidences(cases: Sequence[Estimate], mixed: BoolArray) -> FloatArray:
+    """Log evidences (c,) of Estimates that differ by the priors of some parameters (p,), up to a common constant.
+
+    The integral is over the parameters that no bound holds in any case.
+    """
+    known = np.all([~one.at_bound & np.isfinite(np.diag(one.covariance)) for one in cases], axis=0)
+    sizes = np.sqrt(np.diag(cases[0].covariance))[known]
+    result = []
+    for one in cases:
+        covariance = one.covariance[np.ix_(known, known)] / np.outer(sizes, sizes)
+        prior = float(np.log(one.parameters.sd[mixed]).sum())
+        result.append(0.5 * float(np.linalg.slogdet(covariance)[1]) - prior - one.end.cost)
+    return np.array(result)
 
 
 def estimate_at(problem: Problem, values: npt.ArrayLike, message: str, evaluations: int = 1) -> Estimate:
@@ -100,15 +164,18 @@ def estimate_at(problem: Problem, values: npt.ArrayLike, message: str, evaluatio
     search = _Search(problem, SolverOptions(), np.asarray(values, dtype=float))
     if not np.isfinite(search.cost):
         raise FitError(f"the model predicts no reading at the values of a search; its end: {message}")
-    search.converged, search.message = True, message
-    return search.estimate(evaluations)
+    search.converged, search.message, search.evaluations = True, message, evaluations
+    return search.estimate()
 
 
 class _Search:
-    """One search from one start (p,) within the bounds."""
+    """One search from one start (p,) within the bounds; parameters that are held (p,) keep their value."""
 
-    def __init__(self, problem: Problem, options: SolverOptions, start: FloatArray) -> None:
+    def __init__(
+        self, problem: Problem, options: SolverOptions, start: FloatArray, held: BoolArray | None = None
+    ) -> None:
         self._problem, self._options = problem, options
+        self._held = np.zeros(len(start), dtype=bool) if held is None else held
         self.values = start
         self.evaluations, self.converged, self.straight = 0, False, True
         self.message = "the largest number of iterations is reached"
@@ -141,7 +208,7 @@ class _Search:
     def _penalized(self, white: FloatArray) -> FloatArray:
         """Triangle (p + 1, p + 1) of whitened readings (n a, p + 1) and the priors."""
         parameters = self._problem.parameters
-        root = np.sqrt(parameters.prior_precision(self.values))
+        root = np.sqrt(parameters.prior_precision)
         return with_prior(white, root, root * (self.values - parameters.mean))
 
     def run(self) -> None:
@@ -215,13 +282,22 @@ class _Search:
         parameters, gradient = self._problem.parameters, triangle[:, :-1].T @ triangle[:, -1]
         at_low = (self.values <= parameters.low) & (gradient > 0.0)
         at_high = (self.values >= parameters.high) & (gradient < 0.0)
-        return ~(at_low | at_high)
+        return ~(at_low | at_high | self._held)
 
-    def estimate(self, evaluations: int) -> Estimate:
+    @property
+    def free(self) -> BoolArray:
+        """Parameters (p,) that neither a bound nor the caller holds."""
+        return self._free(self._penalized(self._linearized()))
+
+    @property
+    def end(self) -> SearchEnd:
+        """How the search ended."""
+        return SearchEnd(self.converged, self.straight, self.message, self.cost, self.evaluations)
+
+    def estimate(self) -> Estimate:
         """The Estimate of where the search ended."""
         white = self._linearized()
-        end = SearchEnd(self.converged, self.straight, self.message, self.cost, evaluations)
-        return Estimate.at(self._problem, self.values, white, self._free(self._penalized(white)), end)
+        return Estimate.at(self._problem, self.values, white, self._free(self._penalized(white)), self.end)
 
 
 @dataclass(frozen=True, eq=False)

@@ -67,15 +67,15 @@ def test_linear_problem_is_the_normal_density_of_its_dense_covariance(seed):
     assert log_evidence(estimate) == pytest.approx(expected, rel=1e-8)
 
 
-def test_mixture_prior_is_the_mean_over_its_components():
-    readings = _linear(7, count=2)
-    problem = Problem(readings, _parameters(2, 0.1, wide_sd=[3.0, 5.0]))
-    each = [
-        log_evidence(solve(Problem(readings, _parameters(2, [first, second]))))
-        for first in (0.1, 3.0)
-        for second in (0.1, 5.0)
-    ]
-    assert log_evidence(solve(problem)) == pytest.approx(special.logsumexp(each) - np.log(4.0), abs=1e-8)
+@pytest.mark.parametrize("units", [("mm", "rad"), ("mm", "mm")])
+def test_mixture_prior_is_the_mean_over_its_components(units):
+    """Parameters of one unit have the narrow or the wide prior together."""
+    readings, wide = _linear(7, count=2), [3.0, 5.0]
+    problem = Problem(readings, Parameters((Block.of("x", ["x0", "x1"], units, 0.1, wide_sd=wide),)))
+    cases = [(a, b) for a in (0.1, 3.0) for b in (0.1, 5.0)] if units == ("mm", "rad") else [(0.1, 0.1), (3.0, 5.0)]
+    each = [log_evidence(solve(Problem(readings, _parameters(2, case)))) for case in cases]
+    expected = special.logsumexp(each) - np.log(len(cases))
+    assert log_evidence(solve(problem)) == pytest.approx(expected, abs=1e-8)
 
 
 @pytest.mark.parametrize("lift", [0.4, -0.4])

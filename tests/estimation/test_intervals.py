@@ -1,6 +1,6 @@
 """Credible intervals against scipy's distributions, and against truths that are drawn from the prior."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -79,3 +79,60 @@ def test_truths_that_are_drawn_from_the_prior_lie_inside_as_often_as_stated():
         low, high = estimate.intervals.T
         held.append((low <= truth) & (truth <= high))
     np.testing.assert_allclose(np.mean(held, axis=0), 0.95, atol=4.0 * np.sqrt(0.05 * 0.95 / draws))
+
+
+@dataclass(frozen=True)
+class DeflectionProblem:
+    """Readings (n, 1) of a joint that deflects by a compliance times a load (n,), whose mass is not as stated."""
+
+    load: np.ndarray
+    more: np.ndarray
+    data: np.ndarray
+
+    def residual(self, values):
+        """Readings minus prediction."""
+        zero, compliance, mass = values
+        return (self.data - zero - compliance * (self.load + mass * self.more))[:, None]
+
+    def jacobian(self, values):
+        """Derivative of the residual."""
+        _, compliance, mass = values
+        load = self.load + mass * self.more
+        return -np.stack([np.ones(len(load)), load, compliance * self.more], axis=1)[:, None]
+
+
+def _deflections(seed):
+    """Readings with a noise of 0.02 under a load and a mass drawn from the priors, the problem's truth, the Problem."""
+    generator = np.random.default_rng(seed)
+    truth = np.array([generator.normal(), abs(generator.normal()), (0.1 if generator.random() < 0.5 else 1.0)])
+    truth[2] *= abs(generator.normal())
+    load = generator.normal(size=30)
+    readings = DeflectionProblem(load, load + 0.1 * generator.normal(size=30), np.zeros(30))
+    data = -readings.residual(truth)[:, 0] + 0.02 * generator.standard_normal(30)
+    blocks = (
+        Block.of("zero", ["zero"], [""], 10.0),
+        Block.of("compliance", ["compliance"], [""], 1.0, bounds=(0.0, np.inf)),
+        Block.of("mass", ["mass"], ["kg"], 0.1, wide_sd=1.0, bounds=(-0.9, 10.0)),
+    )
+    return truth, Problem(replace(readings, data=data), Parameters(blocks), lambda v: v / 0.02)
+
+
+def test_an_estimate_of_two_factors_fits_the_readings_and_lies_in_its_own_interval():
+    """The mean of a compliance and that of a mass are no pair that fits: the product is what the readings know."""
+    for seed in range(100):
+        _, problem = _deflections(seed)
+        estimate = solve(problem, [np.array([0.0, 0.5, 0.0])])
+        low, high = estimate.intervals.T
+        assert (low <= estimate.values).all() and (estimate.values <= high).all(), seed
+        rows = 0.5 * (estimate.standardized_residual**2).sum()
+        assert rows < 0.5 * (30 + 6.0 * np.sqrt(60.0)), seed
+
+
+def test_intervals_of_two_factors_hold_truths_from_the_prior_as_often_as_stated():
+    """400 draws, 4 binomial errors."""
+    held = []
+    for seed in range(400):
+        truth, problem = _deflections(1000 + seed)
+        low, high = solve(problem, [np.array([0.0, 0.5, 0.0])]).intervals.T
+        held.append((low <= truth) & (truth <= high))
+    np.testing.assert_allclose(np.mean(held, axis=0), 0.95, atol=4.0 * np.sqrt(0.05 * 0.95 / 400))
