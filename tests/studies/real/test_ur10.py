@@ -52,3 +52,15 @@ def test_held_out_rows_are_in_no_fit(studied):
     held = (studied.measurements["status"] == "held_out").to_numpy()
     assert held.sum() == len(studied.held_out_mm) > 150
     assert not np.isin(np.flatnonzero(held), studied.problem.at).any()
+
+
+def test_the_corrected_model_fits_the_rows_that_it_was_fitted_to(studied, tables):
+    """A compliance times an unstated payload: the mean of each factor left twice the rms on these rows."""
+    inference = studied.diagnosis.inference
+    fitted = np.sqrt((inference.problem.residual(inference.state) ** 2).sum(axis=1).mean())
+    assert fitted < tables["real_verdicts"].iloc[0]["held_out_rms_mm"]
+
+
+def test_every_number_lies_in_its_own_interval(studied):
+    numbers = studied.diagnosis.tables["gap_parameters"].dropna(subset=["low_95", "high_95"])
+    assert (numbers["low_95"] <= numbers["value"]).all() and (numbers["value"] <= numbers["high_95"]).all()
