@@ -120,8 +120,10 @@ class Estimate:
         """Shares (p,) of the variances that come from priors and not from the noise: diag(C P C) over diag(C).
 
         P: precisions of the priors of the parameters in `priors`, by default of all. Next to 1 for a parameter whose
-        unit vector the readings do not determine; NaN where there is no variance.
+        unit vector the readings do not determine; NaN where there is no variance. Of a mixture the mean over its cases.
         """
+        if self.cases:
+            return np.asarray(sum(share * one.prior_shares(priors) for share, one in self.cases))
         precision = np.zeros(len(self.values))
         precision[priors] = self.parameters.prior_precision[priors]
         variance = np.diag(self.covariance)
