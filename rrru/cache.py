@@ -44,6 +44,19 @@ def last_cached_of(method: Callable[[_Owner, Any], _Answer]) -> Callable[[_Owner
     return cached
 
 
+def cached_on(function: Callable[[_Owner], _Answer]) -> Callable[[_Owner], _Answer]:
+    """Cache the result of a function of one object that never changes, on that object; nobody may change it."""
+    name = _key(function)
+
+    @wraps(function)
+    def cached(asked: _Owner) -> _Answer:
+        if name not in asked.__dict__:
+            asked.__dict__[name] = function(asked)
+        return cast(_Answer, asked.__dict__[name])
+
+    return cached
+
+
 def _key(method: Callable[..., Any]) -> str:
     """Where an object stores the result: a method and the one of a base class that it overrides have a place each."""
     return f"_last_{method.__module__}.{method.__qualname__}"

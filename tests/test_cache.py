@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from rrru.cache import last_cached, last_cached_of
+from rrru.cache import cached_on, last_cached, last_cached_of
 
 
 @dataclass(frozen=True)
@@ -53,6 +53,19 @@ def test_a_method_that_overrides_a_cached_one_has_a_result_of_its_own():
 def test_a_replaced_object_has_no_result_of_the_one_before():
     line, x = _Line(2.0), np.array([1.0, 3.0])
     assert line.at(x)[0] == 2.0 and replace(line, slope=5.0).at(x)[0] == 5.0
+
+
+def test_a_function_of_one_object_is_computed_once_for_each_object():
+    computed = []
+
+    @cached_on
+    def slope_of(line):
+        computed.append(line)
+        return line.slope
+
+    line = _Line(2.0)
+    other = replace(line, slope=5.0)
+    assert [slope_of(one) for one in (line, line, other)] == [2.0, 2.0, 5.0] and computed == [line, other]
 
 
 def test_results_are_those_of_the_argument_as_it_was():

@@ -23,14 +23,14 @@ All sets of effects then compare on the readings at which every effect of the li
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property, partial, wraps
+from functools import cached_property, lru_cache, partial, wraps
 from itertools import product
 from typing import Concatenate, ParamSpec, TypeVar
 
 import numpy as np
 
 from rrru.arrays import BoolArray, FloatArray, IntArray
-from rrru.cache import Latest
+from rrru.cache import Latest, read_only
 from rrru.diagnosis.aliases import Grams
 from rrru.diagnosis.discrepancy_basis import Library
 from rrru.diagnosis.evidence_kernels import log_sum_exp
@@ -253,14 +253,14 @@ class ModelEvidence:
         may be.
         """
         grids = tuple(prior_scales or (PRIOR_SCALES,) * len(terms))
-        combinations = np.array(list(product(*grids)))
+        combinations = _combinations(*(tuple(grid) for grid in grids))
         levels = self.levels if levels is None else levels
         broad = self._broadest(terms)
         if broad is None:
             found = gained_over_cases(self.projected(terms, levels), combinations)
             return self.none.take(levels)[:, None] + found, combinations
         narrow, others = (*terms[:broad], *terms[broad + 1 :]), (*grids[:broad], *grids[broad + 1 :])
-        rows = np.array(list(product(*others)))
+        rows = _combinations(*(tuple(grid) for grid in others))
         problem = self.projected(narrow, levels) if narrow else None
         value = self._with_broad_term(terms[broad], grids[broad], problem, rows, levels)
         value = value.reshape(len(levels), len(grids[broad]), *map(len, others))
@@ -445,9 +445,18 @@ class _AlongPriorScales:
     def __init__(self, after: Callable[[FloatArray], tuple[FloatArray, MarginalProblem]], broad: int | None) -> None:
         self._after, self._broad = after, broad
         self._made: dict[float, tuple[FloatArray, MarginalProblem]] = {}
+        # the last sweep asks again for terms after which none has moved
+        self._known: dict[tuple[float, ...], FloatArray] = {}
 
     def of_term(self, k: int, prior_scales: FloatArray) -> FloatArray:
-        """Log evidence (s,) at PRIOR_SCALES of term k, and at prior_scales (terms,) of the others."""
+        """Log evidence (s,) at PRIOR_SCALES of term k, and at prior_scales (terms,) of the others; read-only."""
+        asked = k, *prior_scales[:k].tolist(), *prior_scales[k + 1 :].tolist()
+        if asked not in self._known:
+            self._known[asked] = read_only(self._evaluated(k, prior_scales))
+        return self._known[asked]
+
+    def _evaluated(self, k: int, prior_scales: FloatArray) -> FloatArray:
+        """`of_term`, computed."""
         others = prior_scales if self._broad is None else np.delete(prior_scales, self._broad)
         if k == self._broad:
             alone, problem = self._cached(np.inf)
@@ -462,6 +471,12 @@ class _AlongPriorScales:
         if of_broad not in self._made:
             self._made[of_broad] = self._after(PRIOR_SCALES if np.isinf(of_broad) else np.array([of_broad]))
         return self._made[of_broad]
+
+
+@lru_cache(maxsize=256)
+def _combinations(*grids: tuple[float, ...]) -> FloatArray:
+    """Every combination (m, terms) of one number of each grid; read-only."""
+    return read_only(np.array(list(product(*grids)), dtype=float))
 
 
 def averaged(value: FloatArray, terms: int) -> FloatArray:

@@ -11,6 +11,7 @@ from scipy.linalg import cho_solve, solve_triangular
 from scipy.special import ndtr, stdtrit
 
 from rrru.arrays import FloatArray, IntArray
+from rrru.cache import Latest, read_only
 from rrru.campaign.noise import along_runs
 from rrru.diagnosis.drive_spectra import jumps, over_range
 from rrru.diagnosis.evidence import ModelEvidence
@@ -18,7 +19,7 @@ from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.problem import DiagnosisProblem
 from rrru.diagnosis.state import LeftByCalibration
 from rrru.diagnosis.terms import EffectTerm, signatures, spread
-from rrru.diagnosis.whitened import discrepancy_scales, spectrum
+from rrru.diagnosis.whitened import DISCREPANCY_SCALES, discrepancy_scales, spectrum
 from rrru.estimation.cross_validation import (
     ComplementFit,
     choose_folds,
@@ -123,6 +124,14 @@ class HeldOut:
             if uncertain:
                 spread[out] = fit.half(together[out].reshape(-1, len(fit.mean))).T.reshape(-1, 3, len(fit.mean))
         return Prediction(residual, spread, self._left(level), self.problem.series if self._whole_runs else None)
+
+    def log_score_alone(self, level: int) -> FloatArray:
+        """`Prediction.log_score` (n,) of the calibration alone at a discrepancy level (an index)."""
+        return np.asarray(self._alone.of(level, lambda: read_only(self.predict((), [], level).log_score)))
+
+    @cached_property
+    def _alone(self) -> Latest:
+        return Latest(len(DISCREPANCY_SCALES))
 
     def shares(
         self, terms: Sequence[EffectTerm], prior_scales: Sequence[float] | FloatArray, level: int

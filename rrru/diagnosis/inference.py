@@ -32,11 +32,11 @@ from rrru.errors import FitError
 from rrru.estimation.noise_model import (
     MIN_FREE_MEANS,
     MIN_FREE_NUMBERS,
+    BlockTests,
     alike,
     fit_noise,
     free_numbers,
     high_frequency_noises,
-    p_value,
 )
 
 # what the configuration says of the noise
@@ -210,7 +210,12 @@ def _leaves_enough(
     """Whether columns (m, 3, k) leave enough of the numbers for an estimate of the noise; prior_sd (k,), or None."""
     count = linear.data.size
     free = count - columns.shape[-1] if prior_sd is None else free_numbers(columns, prior_sd / problem.noise_mm)
-    return bool(free >= max(MIN_FREE_NUMBERS, OPTIONS.min_free_share * count))
+    return _is_enough(linear, free)
+
+
+def _is_enough(linear: LinearizedProblem, free: float) -> bool:
+    """Whether so many degrees of freedom are enough for an estimate of the noise."""
+    return bool(free >= max(MIN_FREE_NUMBERS, OPTIONS.min_free_share * linear.data.size))
 
 
 def _is_searched(coordinates: Coordinates, shape: int) -> bool:
@@ -230,17 +235,23 @@ def _with_significant(
     too low. The F test is at a level that the prior probabilities of the orders share out (weighted Bonferroni:
     Genovese, Roeder and Wasserman, False discovery control with p-value weighting, Biometrika 93, 2006).
     """
-    columns, prior_sd = chosen
+    (columns, prior_sd), accepted = chosen, []
+    if not searched:
+        return chosen
+    tests = BlockTests(linear.data, np.concatenate([columns, *searched.values()], axis=-1))
+    present, first = np.arange(columns.shape[-1]), columns.shape[-1]
     for (name, shape), block in searched.items():
-        together, both_sd = np.concatenate([columns, block], axis=-1), prior_sd
-        if prior_sd is not None:
-            both_sd = np.append(prior_sd, np.full(block.shape[-1], np.inf))
-        over_noise = None if prior_sd is None else prior_sd / problem.noise_mm
+        own = np.arange(first, first + block.shape[-1])
+        first += len(own)
+        if prior_sd is None and not _is_enough(linear, linear.data.size - len(present) - len(own)):
+            continue
+        p_value, free = tests.of(present, own, None if prior_sd is None else prior_sd / problem.noise_mm)
         level = OPTIONS.max_searched_order_p * shape_probabilities(problem.library[name].coordinates)[shape]
-        enough = _leaves_enough(problem, linear, together, both_sd)
-        if enough and p_value(linear.data, columns, block, over_noise) < level:
-            columns, prior_sd = together, both_sd
-    return columns, prior_sd
+        if p_value < level and (prior_sd is None or _is_enough(linear, free)):
+            accepted.append(block)
+            present = np.concatenate([present, own])
+            prior_sd = None if prior_sd is None else np.append(prior_sd, np.full(len(own), np.inf))
+    return np.concatenate([columns, *accepted], axis=-1), prior_sd
 
 
 def _fewer_blocks(

@@ -119,19 +119,26 @@ class MarginalProblem:
 
     def scale(self, prior_scales: FloatArray) -> FloatArray:
         """Prior standard deviations (m, k) at prior_scales (m, terms)."""
-        scales = np.concatenate([prior_scales, np.ones((len(prior_scales), 1))], axis=1)
-        return np.minimum(scales[:, self.owner] * self.size, self.largest)
+        scales = np.ones((len(prior_scales), prior_scales.shape[1] + 1))
+        scales[:, :-1] = prior_scales
+        return np.minimum(scales.take(self.owner, axis=1) * self.size, self.largest)
 
 
 def gained(problem: MarginalProblem, scale: FloatArray) -> FloatArray:
     """Log evidence (levels, m) of a MarginalProblem at prior deviations (m, k) over that of none of its terms."""
+    if not problem.about.any():
+        return gained_about_zero(problem, scale)
     scale = np.ascontiguousarray(scale)
     gram, moment = np.ascontiguousarray(problem.gram), np.ascontiguousarray(problem.moment)
-    if not problem.about.any():
-        return kernels.log_evidence(gram, moment, scale, problem.positive)
     explained = gram @ problem.about
     at_means = (moment - 0.5 * explained) @ problem.about
     return at_means[:, None] + kernels.log_evidence(gram, moment - explained, scale, problem.positive)
+
+
+def gained_about_zero(problem: MarginalProblem, scale: FloatArray) -> FloatArray:
+    """`gained` (levels, m) where all priors are about zero."""
+    gram, moment = np.ascontiguousarray(problem.gram), np.ascontiguousarray(problem.moment)
+    return kernels.log_evidence(gram, moment, np.ascontiguousarray(scale), problem.positive)
 
 
 def evidence_error(problem: MarginalProblem, scale: FloatArray) -> FloatArray:

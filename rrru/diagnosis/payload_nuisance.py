@@ -28,7 +28,13 @@ import numpy as np
 from rrru.arrays import FloatArray, IntArray
 from rrru.diagnosis.aliases import Grams, WeightStep
 from rrru.diagnosis.evidence_kernels import log_sum_exp
-from rrru.diagnosis.marginal_problem import MarginalProblem, gained, posterior_covariance, posterior_mean
+from rrru.diagnosis.marginal_problem import (
+    MarginalProblem,
+    gained,
+    gained_about_zero,
+    posterior_covariance,
+    posterior_mean,
+)
 from rrru.diagnosis.options import OPTIONS
 from rrru.effects.protocol import Motion
 from rrru.kinematics.dynamics import Masses, carried_kg, level_axes
@@ -124,7 +130,7 @@ def gained_over_cases(problem: MarginalProblem, prior_scales: FloatArray) -> Flo
         as_it_is = problem.scale(np.concatenate([prior_scales[narrow], least[narrow]]))
         # under a prior too narrow for the coefficients the nuisance columns, as large as these, would replace them
         as_it_is[:, -len(problem.weights) :] = OPTIONS.fixed_nuisance_sd_ratio
-        fixed, at_least = np.split(gained(replace(problem, about=np.zeros_like(problem.about)), as_it_is), 2, axis=1)
+        fixed, at_least = np.split(gained_about_zero(problem, as_it_is), 2, axis=1)
         result[:, narrow] = fixed + np.minimum(result[:, narrow] - at_least, 0.0)
     return result
 

@@ -1,6 +1,6 @@
 """Posterior probabilities of effects, of sets of them, and of a discrepancy, from the evidence of hypotheses."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import comb
@@ -73,7 +73,8 @@ class Posterior:
         """The hypothesis of highest weight and its level (an index)."""
         return self._best(range(len(self.hypotheses)), self.log_weights)
 
-    def sets(self) -> dict[CauseSet, float]:
+    @cached_property
+    def sets(self) -> Mapping[CauseSet, float]:
         """Probability by (frozenset of effects, unexplained), highest first."""
         result: dict[CauseSet, float] = {}
         for hypothesis, weight, unexplained in zip(self.hypotheses, self.weights, self.unexplained, strict=True):
@@ -86,7 +87,7 @@ class Posterior:
     @property
     def probability_unexplained(self) -> float:
         """Probability that something acts that the library does not hold."""
-        return sum(p for (_, flag), p in self.sets().items() if flag)
+        return sum(p for (_, flag), p in self.sets.items() if flag)
 
     def marginal(self, effect: str) -> float:
         """Probability that an effect acts."""
@@ -179,6 +180,7 @@ class Weigher:
         self._functions = sum(name in UNKNOWN for name in library)
         known = len(library) - self._functions
         self._sets = [prior.log_set(count, known) for count in range(known + 1)]
+        self._function = float(np.log(prior.unexplained / max(self._functions, 1)))
         for name in library.keys() - UNKNOWN.keys():
             kinds = {term.legs if isinstance(term.legs, str) else "one" for term in variants(library[name])}
             coordinates, some = library[name].coordinates, may_be_on_some(library[name]) * OPTIONS.prior_some_legs
@@ -199,7 +201,7 @@ class Weigher:
         """Logarithm of the prior probability of a set of terms, whatever the discrepancy."""
         known = [term for term in terms if term.effect not in UNKNOWN]
         total = self._sets[len(known)]
-        total += (len(terms) - len(known)) * np.log(self._prior.unexplained / max(self._functions, 1))
+        total += (len(terms) - len(known)) * self._function
         for term in known:
             if term not in self._of_terms:
                 of_shape = float(self._effects[term.effect][term.shape])
@@ -207,7 +209,7 @@ class Weigher:
             of_shape, of_legs = self._of_terms[term]
             total += of_shape
             total += of_legs
-        return float(total)
+        return total
 
     def _of_legs(self, term: EffectTerm) -> float:
         """Prior probability of a term's legs: numbers of them are equally probable, and choices of one number, too."""

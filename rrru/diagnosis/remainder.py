@@ -18,6 +18,7 @@ from scipy.linalg import solve_triangular
 from scipy.spatial.distance import cdist
 
 from rrru.arrays import BoolArray, FloatArray, IntArray
+from rrru.cache import cached_on
 from rrru.diagnosis.heldout import within
 from rrru.diagnosis.inference import InferenceResult
 from rrru.diagnosis.options import OPTIONS
@@ -47,6 +48,7 @@ class _Variable:
     steps: bool = False
 
 
+@cached_on
 def remainder_rows(inference: InferenceResult) -> pd.DataFrame:
     """Rows of `gap_remainder` without the campaign, the variable that explains most first.
 

@@ -82,7 +82,7 @@ def _attribute_rows(inference: InferenceResult, verdict: Verdict) -> pd.DataFram
         {"effect": name, "probability": np.nan, **_EMPTY, "note": f"not tested: {note}"}
         for name, note in problem.untestable.items()
     ]
-    none, unknown = posterior.sets().get((frozenset(), False), 0.0), posterior.probability_unexplained
+    none, unknown = posterior.sets.get((frozenset(), False), 0.0), posterior.probability_unexplained
     result.append({"effect": "none", "probability": none, **_EMPTY})
     result.append({"effect": "unexplained", "probability": unknown, **_EMPTY})
     rows = pd.DataFrame(result)
@@ -173,8 +173,8 @@ def _effect_row(inference: InferenceResult, name: str) -> Row:
     single = max((h for h in holding if len(h.terms) == 1), key=lambda h: h.evidence.max(), default=None)
     if single:
         level, held_out = int(single.evidence.argmax()), inference.held_out.on_complete(single.terms)
-        alone = held_out.predict((), [], level).log_score
-        gained = held_out.predict(single.terms, single.prior_scales[level], level).log_score - alone
+        gained = held_out.predict(single.terms, single.prior_scales[level], level).log_score
+        gained = gained - held_out.log_score_alone(level)
         by_fold = np.array([gained[held_out.fold == k].sum() for k in np.unique(held_out.fold)])
         row["heldout_gain"] = float(by_fold.sum())
         if len(by_fold) > 1:
@@ -186,7 +186,7 @@ def _effect_row(inference: InferenceResult, name: str) -> Row:
 def _set_rows(inference: InferenceResult) -> pd.DataFrame:
     """Rows of `gap_sets`: the most probable sets."""
     result, none = [], inference.evidence.on_library().none.max()
-    sets = list(inference.posterior.sets().items())[: OPTIONS.max_listed_sets]
+    sets = list(inference.posterior.sets.items())[: OPTIONS.max_listed_sets]
     for rank, ((effects, unexplained), probability) in enumerate(sets, start=1):
         best = inference.posterior.best_of(effects, unexplained)
         # a set of the posterior has a hypothesis

@@ -104,7 +104,7 @@ def decide(posterior: Posterior, library: Mapping[str, Effect], small: Collectio
     its causes are called possible. Something is unexplained where that is more probable than not; an effect that makes
     a small part of the gap may then be a part of that.
     """
-    sets, unknown = posterior.sets(), posterior.probability_unexplained
+    sets, unknown = posterior.sets, posterior.probability_unexplained
     none = sets.get(_NONE, 0.0)
     marginal = {name: posterior.marginal(name) for name in library}
     order = sorted(marginal, key=lambda name: (-marginal[name], name))

@@ -154,7 +154,8 @@ class Whitened:
             rest -= basis @ (basis.T @ rest)
             gram, sums = rest.T @ rest, self.layout[1]
             gram, moment = gram[:-1, :-1], gram[:-1, -1]
-            across = gram @ sums
-            gram = np.block([[gram, across], [across.T, sums.T @ across]])
-            self._made[level] = gram, np.concatenate([moment, sums.T @ moment])
+            k, across = len(gram), gram @ sums
+            whole = np.empty((k + sums.shape[1], k + sums.shape[1]))
+            whole[:k, :k], whole[:k, k:], whole[k:, :k], whole[k:, k:] = gram, across, across.T, sums.T @ across
+            self._made[level] = whole, np.concatenate([moment, sums.T @ moment])
         return self._made[level]

@@ -13,6 +13,9 @@ _REACH, _STEPS = 6.0, 1000
 # distances from a bound over the standard deviation, for densities that fall steeply from there
 _FROM_BOUND = np.logspace(-6.0, 1.0, 2000)
 
+# so many standard deviations from the mean a density over the largest one rounds to zero: exp(-800)
+_NO_DENSITY = 40.0
+
 
 @dataclass(frozen=True)
 class NormalMixture:
@@ -43,7 +46,12 @@ class NormalMixture:
         """Values (n,) in ascending order between two bounds, dense where the density changes."""
         steps = np.linspace(-_REACH, _REACH, 2 * _STEPS + 1)
         nodes = [(self.mean[:, None] + self.sd[:, None] * steps).ravel()]
+        inside = bool(((low <= self.mean) & (self.mean <= high)).all())
         for bound, side in ((low, 1.0), (high, -1.0)):
             if np.isfinite(bound):
-                nodes.append(bound + side * np.concatenate([[0.0], *(sd * _FROM_BOUND for sd in self.sd)]))
+                farthest = self.sd.max() * _FROM_BOUND[-1]
+                # no density between the two
+                empty = inside and bool((np.abs(self.mean - bound) - farthest > _NO_DENSITY * self.sd).all())
+                away = np.array([farthest]) if empty else np.outer(self.sd, _FROM_BOUND).ravel()
+                nodes.append(bound + side * np.append(0.0, away))
         return np.unique(np.clip(np.concatenate(nodes), low, high))

@@ -20,7 +20,7 @@ and not part of the noise: a noise that had to account for it would be too large
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, partial
 from typing import Self
 
 import numpy as np
@@ -30,7 +30,8 @@ from scipy.linalg import qr, toeplitz
 from scipy.optimize import minimize_scalar
 from scipy.special import chdtr, expit, fdtrc
 
-from rrru.arrays import FloatArray
+from rrru.arrays import FloatArray, IntArray
+from rrru.cache import Latest
 from rrru.campaign.noise import along_runs
 
 _CORRELATIONS = np.array([0.0, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9])
@@ -272,23 +273,45 @@ def high_frequency_noises(
     return equal
 
 
-def p_value(data: FloatArray, columns: FloatArray, block: FloatArray, prior_sd: FloatArray | None = None) -> float:
-    """The p value of the F test of a block (m, 3, c) in addition to columns (m, 3, k), of data (m, 3) of equal noises.
+class BlockTests:
+    """F tests of blocks of columns in addition to others, of data (m, 3) of equal noises.
 
-    1 where the columns hold the block; see `rrru.estimation.f_test`. prior_sd (k,): as for `fit_noise`, over the noise.
+    All columns (m, 3, k) and the data are reduced to one triangle, which has their sums of squares and their ranks; see
+    `rrru.estimation.f_test`.
     """
-    flat, count = np.concatenate([columns, block, data[..., None]], axis=-1).reshape(data.size, -1), columns.shape[-1]
-    # the triangle of all columns has their sums of squares, and their ranks
-    triangle = qr(flat, mode="r", check_finite=False)[0][: flat.shape[1]]
-    both_sd = None if prior_sd is None else np.concatenate([prior_sd, np.full(block.shape[-1], np.inf)])
-    left, share = _left(triangle[:, -1], triangle[:, :-1], both_sd)
-    without, its_share = _left(triangle[:, -1], triangle[:, :count], prior_sd)
-    freedom, rank = data.size - round(float((1.0 - share).sum())), round(float((its_share - share).sum()))
-    if rank < 1 or freedom < 1:
-        return 1.0
-    unexplained = float(left @ left)
-    ratio = (float(without @ without) - unexplained) / rank * freedom / max(unexplained, 1e-300)
-    return float(fdtrc(rank, freedom, max(ratio, 0.0)))
+
+    def __init__(self, data: FloatArray, columns: FloatArray) -> None:
+        self._count, self._together = data.size, np.concatenate([columns, data[..., None]], axis=-1)
+        # blocks are tested in addition to the same columns, one after another
+        self._without = Latest(1)
+
+    @cached_property
+    def _triangle(self) -> FloatArray:
+        flat = self._together.reshape(self._count, -1)
+        return np.asarray(qr(flat, mode="r", check_finite=False)[0][: flat.shape[1]])
+
+    def of(self, columns: IntArray, block: IntArray, prior_sd: FloatArray | None = None) -> tuple[float, float]:
+        """The p value of a block (c,) in addition to columns (k,), numbers of both, and the degrees of freedom left.
+
+        1 where the columns hold the block. prior_sd (k,): of the columns' coefficients, as for `fit_noise`, over the
+        noise.
+        """
+        both = np.concatenate([columns, block])
+        both_sd = None if prior_sd is None else np.concatenate([prior_sd, np.full(len(block), np.inf)])
+        left, share = self._left(both, both_sd)
+        asked = columns.tobytes(), None if prior_sd is None else prior_sd.tobytes()
+        without, its_share = self._without.of(asked, lambda: self._left(columns, prior_sd))
+        free = self._count - float((1.0 - share).sum())
+        freedom, rank = round(free), round(float((its_share - share).sum()))
+        if rank < 1 or freedom < 1:
+            return 1.0, free
+        unexplained = float(left @ left)
+        ratio = (float(without @ without) - unexplained) / rank * freedom / max(unexplained, 1e-300)
+        return float(fdtrc(rank, freedom, max(ratio, 0.0))), free
+
+    def _left(self, columns: IntArray, prior_sd: FloatArray | None) -> tuple[FloatArray, FloatArray]:
+        """`_left` of the triangle."""
+        return _left(self._triangle[:, -1], self._triangle[:, columns], prior_sd)
 
 
 def free_numbers(columns: FloatArray, prior_sd: FloatArray | None = None) -> float:
@@ -507,12 +530,17 @@ class _Seen:
     ) -> FloatArray:
         """Variances (g, u, 3) over those of the axes at g correlations and offsets and a size of the discrepancy."""
         _, _, wave, length, smooth = self._by_wave
-        result = np.empty((len(correlation), len(wave), 3))
-        densities = {phi: _densities(phi, wave, length) for phi in np.unique(correlation).tolist()}
-        for row, (phi, its_offset) in enumerate(zip(correlation.tolist(), offset, strict=True)):
-            along, run = densities[phi]
-            result[row] = 1.0 + correlated * (along - 1.0) + its_offset * run + size**2 * smooth
+        result, smooth = np.empty((len(correlation), len(wave), 3)), size**2 * smooth
+        for phi in np.unique(correlation).tolist():
+            along, run = self._known_densities.of(phi, partial(_densities, phi, wave, length))
+            chosen = correlation == phi
+            result[chosen] = 1.0 + correlated * (along - 1.0) + offset[chosen, None, None] * run + smooth
         return result
+
+    @cached_property
+    def _known_densities(self) -> Latest:
+        """`_densities` by correlation, the same for every size of the discrepancy."""
+        return Latest(len(_CORRELATIONS) + 1)
 
     def _axes(self, shapes: FloatArray, known: Sequence[tuple[float, float]]) -> tuple[FloatArray, FloatArray]:
         """Variances (g, 3) of the axes under variances of shapes (g, u, 3), and their log posteriors (g,).

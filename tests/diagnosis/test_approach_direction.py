@@ -147,7 +147,7 @@ def test_a_set_confounded_with_backlash_does_not_win_by_the_readings_of_open_sen
     """An effect of the drives' values may explain readings at which backlash predicts nothing: that does not count."""
     problem = _open(problem_of(measure((strong("backlash", 4.0),))), 0.66)
     found = infer(problem, Prior()).posterior
-    assert found.sets()[frozenset({"backlash"}), False] > 0.8 and found.probability_unexplained < 0.1
+    assert found.sets[frozenset({"backlash"}), False] > 0.8 and found.probability_unexplained < 0.1
 
 
 def _along_lines(effects, jitter_rad, seed=4):

@@ -6,6 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 from scipy.fft import idct
+from scipy.stats import f
 
 from rrru.campaign import measurements as rows
 from rrru.campaign.noise import along_runs
@@ -17,7 +18,15 @@ from rrru.diagnosis.inference import with_noise
 from rrru.diagnosis.make_problem import make_diagnosis_problem
 from rrru.diagnosis.settings import GapSettings
 from rrru.diagnosis.whitened import spectrum
-from rrru.estimation.noise_model import NoiseModel, fit_noise, half_waves, high_frequency_noises, lengths
+from rrru.estimation.noise_model import (
+    BlockTests,
+    NoiseModel,
+    fit_noise,
+    free_numbers,
+    half_waves,
+    high_frequency_noises,
+    lengths,
+)
 from tests.diagnosis import arms
 from tests.diagnosis.campaigns import (
     EFFECTS,
@@ -44,6 +53,38 @@ def _noise(generator, run, axis_mm, correlation=0.0, offset_mm=0.0):
         result[i] = now if begins else correlation * result[i - 1] + np.sqrt(1.0 - correlation**2) * now
     offsets = offset_mm * generator.standard_normal((run.max() + 1, 3))
     return result * axis_mm + offsets[run]
+
+
+@pytest.mark.parametrize("with_priors", [False, True])
+def test_blocks_that_share_a_triangle_have_the_f_test_of_each(with_priors):
+    """Against residuals of plain least squares, in which a prior is one reading more."""
+    generator = np.random.default_rng(3)
+    columns, blocks = generator.standard_normal((40, 3, 7)), generator.standard_normal((2, 40, 3, 4))
+    # the first column of the second block is one of the columns
+    blocks[1, ..., 0] = columns[..., 2]
+    data = generator.standard_normal((40, 3)) + 0.6 * blocks[0, ..., 1]
+    prior_sd = np.array([0.3, 0.3, *[np.inf] * 5]) if with_priors else None
+    tests = BlockTests(data, np.concatenate([columns, *blocks], axis=-1))
+    for number, block in enumerate(blocks):
+        together = np.concatenate([columns, block], axis=-1)
+        squares, ranks = [], []
+        for chosen in (columns, together):
+            flat, readings = chosen.reshape(data.size, -1), data.ravel()
+            if with_priors:
+                rows = np.zeros((2, flat.shape[1]))
+                rows[[0, 1], [0, 1]] = 1.0 / 0.3
+                flat, readings = np.concatenate([flat, rows]), np.append(readings, [0.0, 0.0])
+            fitted = flat @ np.linalg.lstsq(flat, readings)[0]
+            squares.append(((readings - fitted)[: data.size] ** 2).sum())
+            projector = flat @ np.linalg.pinv(flat)
+            ranks.append(np.trace(projector[: data.size, : data.size]))
+        rank, freedom = round(ranks[1] - ranks[0]), round(data.size - ranks[1])
+        expected = f.sf((squares[0] - squares[1]) / rank / (squares[1] / freedom), rank, freedom)
+        own = 7 + 4 * number + np.arange(4)
+        p_value, free = tests.of(np.arange(7), own, prior_sd)
+        assert (rank, p_value) == (4 - number, pytest.approx(expected, rel=1e-6))
+        both_sd = None if prior_sd is None else np.append(prior_sd, np.full(4, np.inf))
+        assert free == pytest.approx(free_numbers(together, both_sd)) == pytest.approx(data.size - ranks[1])
 
 
 @pytest.mark.parametrize(("correlation", "offset"), [(0.0, 0.0), (0.5, 0.0), (0.8, 0.3)])

@@ -113,7 +113,7 @@ def test_without_data_the_probabilities_are_the_prior(arm):
     every = [_hypothesis(*terms) for size in range(3) for terms in _all(size, library)]
     found = posterior(_stub(1.5, library), every, prior)
     assert found.weights.sum() == pytest.approx(1.0)
-    sets = found.sets()
+    sets = found.sets
     effects = len(library)
     pairs = effects * (effects - 1) // 2
     for size, count, kinds in ((0, 0.3, 1), (1, 0.5, effects), (2, 0.2, pairs)):

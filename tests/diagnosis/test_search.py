@@ -89,7 +89,7 @@ def test_five_effects_at_once_are_all_found():
     found = infer(problem, Prior())
     assert found.hypothesis.effects == set(names)
     assert min(found.posterior.marginal(name) for name in names) > 0.99
-    assert sum(p for (effects, flag), p in found.posterior.sets().items() if not flag and effects == set(names)) > 0.5
+    assert sum(p for (effects, flag), p in found.posterior.sets.items() if not flag and effects == set(names)) > 0.5
 
 
 def test_every_effect_alone_is_always_weighed():

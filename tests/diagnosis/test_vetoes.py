@@ -45,7 +45,7 @@ def _found(off, whole=True):
 
 def test_where_every_likely_set_holds_it_others_are_looked_for():
     found = _found(0.3)
-    likely = [names for (names, _), p in found.posterior.sets().items() if p > 1e-9]
+    likely = [names for (names, _), p in found.posterior.sets.items() if p > 1e-9]
     assert likely and all("whole" in names for names in likely)
     pair = frozenset({"first", "second"})
     assert found.posterior.best_of(pair) is None

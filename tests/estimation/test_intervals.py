@@ -39,6 +39,26 @@ def test_of_a_mixture_it_holds_its_share_and_has_equal_densities_at_its_ends():
     assert share @ norm.pdf(low, mean, sd) == pytest.approx(share @ norm.pdf(high, mean, sd), rel=0.02)
 
 
+class _OnAllNodes(NormalMixture):
+    """A mixture that has nodes next to every bound, wherever its density is."""
+
+    def _nodes(self, low, high):
+        nodes = [(self.mean[:, None] + self.sd[:, None] * np.linspace(-6.0, 6.0, 2001)).ravel()]
+        for bound, side in ((low, 1.0), (high, -1.0)):
+            distances = np.concatenate([[0.0], *(sd * np.logspace(-6.0, 1.0, 2000) for sd in self.sd)])
+            nodes.append(bound + side * distances)
+        return np.unique(np.clip(np.concatenate(nodes), low, high))
+
+
+@pytest.mark.parametrize("low", [-1000.0, -30.0, -21.0, -5.0, 0.0, 0.9])
+@pytest.mark.parametrize("high", [1.3, 4.0, 45.0, 60.0, 1000.0])
+def test_nodes_next_to_a_bound_without_density_change_no_digit(low, high):
+    share, mean, sd = np.array([0.6, 0.4]), np.array([0.2, 1.0]), np.array([0.3, 0.5])
+    one, other = (kind(share, mean, sd) for kind in (NormalMixture, _OnAllNodes))
+    assert one.interval(low, high) == other.interval(low, high)
+    assert len(one._nodes(-1000.0, 1000.0)) < 0.4 * len(other._nodes(-1000.0, 1000.0))
+
+
 @dataclass(frozen=True)
 class LinearizedProblem:
     """Readings (n, 1) of a linear model."""

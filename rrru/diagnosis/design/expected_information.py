@@ -212,7 +212,7 @@ def _pairs(
         return
     rivals = [frozenset(names) for names, flag, _ in verdict.rivals if not flag and frozenset(names) != effects]
     if not rivals:
-        rivals = [names for names, flag in posterior.sets() if not flag and names != effects]
+        rivals = [names for names, flag in posterior.sets if not flag and names != effects]
     for names in rivals:
         yield posterior.best_of(effects), posterior.best_of(names)
 

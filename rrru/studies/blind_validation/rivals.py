@@ -241,7 +241,7 @@ def _by_diagnosis(measurements, known, settings):
     """Verdict, probability by set of effects with all unexplained sets as one, and explained fraction."""
     result = diagnose(measurements, known, settings, details=False)
     probabilities = {}
-    for (effects, unexplained), probability in result.inference.posterior.sets().items():
+    for (effects, unexplained), probability in result.inference.posterior.sets.items():
         name = UNEXPLAINED if unexplained else in_order("+".join(effects)) or NONE
         probabilities[name] = probabilities.get(name, 0.0) + probability
     return result.verdict["effects"], probabilities, result.verdict["share_closed"]
