@@ -53,13 +53,14 @@ class Results:
     """What a run has written to a folder.
 
     reproduced: the campaign whose figures are next to the study's; campaign: the one whose parts are read, None for the
-    whole study; glyphs: shared glyphs of the figures that were asked for.
+    whole study; glyphs: shared glyphs of the figures that were asked for; frames: tables that were asked for.
     """
 
     folder: Path
     reproduced: str
     campaign: str | None = None
     glyphs: dict[str, str] = field(default_factory=dict)
+    frames: dict[str, pd.DataFrame | None] = field(default_factory=dict)
 
     @cached_property
     def schemas(self) -> dict[str, Table]:
@@ -75,9 +76,11 @@ class Results:
 
     def frame(self, name: str) -> pd.DataFrame | None:
         """A table as a frame, None where it was not made or holds nothing."""
-        place = self.place(name)
-        frame = tables.read(place) if place.is_file() else None
-        return None if frame is None or frame.empty else frame
+        if name not in self.frames:
+            place = self.place(name)
+            frame = tables.read(place) if place.is_file() else None
+            self.frames[name] = None if frame is None or frame.empty else frame
+        return self.frames[name]
 
     def campaigns(self) -> list[str]:
         """Campaigns that the last run has diagnosed, measured ones first."""

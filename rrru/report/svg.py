@@ -5,7 +5,7 @@ import re
 from dataclasses import dataclass
 
 # a hundredth of a point is finer than any screen; glyphs are drawn in whole numbers
-_FRACTION = re.compile(r"(\d+\.\d\d)\d+")
+_FRACTION = re.compile(r"(?<=\d\.\d\d)\d+")
 _ID = re.compile(r' id="([^"]+)"')
 _REFERENCE = re.compile(r'(xlink:href="#|url\(#)([^")]+)')
 _GLYPH = re.compile(r'<path id="(DejaVu[^"]+)"[^>]*/>')
@@ -39,7 +39,7 @@ def inline(text: str, name: str, label: str) -> Inline:
     width, height = map(float, _SIZE.findall(text)[0])
     glyphs = dict((found[1], found[0]) for found in _GLYPH.finditer(text))
     body = _SIZE.sub("", _GLYPH.sub("", _DROPPED.sub("", text)))
-    body = _FRACTION.sub(r"\1", " ".join(body.split())).replace("> <", "><").replace("<defs></defs>", "")
+    body = _FRACTION.sub("", " ".join(body.split())).replace("> <", "><").replace("<defs></defs>", "")
     used = {reference for _, reference in _REFERENCE.findall(body)} - set(glyphs)
     body = _ID.sub(lambda found: f' id="{name}-{found[1]}"' if found[1] in used else "", body)
     body = _REFERENCE.sub(lambda found: f"{found[1]}{name}-{found[2]}" if found[2] in used else found[0], body)

@@ -5,7 +5,6 @@ from fnmatch import fnmatchcase
 from typing import Any
 
 import pandas as pd
-from tqdm import tqdm
 
 from rrru.calibration.campaign_fit import select
 from rrru.campaign.measurements import at_tool
@@ -44,6 +43,9 @@ def write(frames: Mapping[str, pd.DataFrame], paths: Mapping[str, str]) -> None:
 
 def _runs(settings: Mapping[str, Any], read: Mapping[str, pd.DataFrame], searched: str) -> dict[str, pd.DataFrame]:
     """Frames by table of all runs; searched: the searched set of parameters."""
+    # loaded where the algorithm runs, for few campaigns
+    from tqdm import tqdm
+
     genetic, name, nominal = settings["genetic"], settings["campaign"], settings["nominal"]
     calibration = settings["calibration"]
     # its objective uses positions of the tool only, in the robot's frame
