@@ -45,7 +45,7 @@ def last_cached_of(method: Callable[[_Owner, Any], _Answer]) -> Callable[[_Owner
 
 
 def cached_on(function: Callable[[_Owner], _Answer]) -> Callable[[_Owner], _Answer]:
-    """Cache the result of a function of one object that never changes, on that object; nobody may change it."""
+    """Cache the result of a function of one object that never changes, on that object; callers do not change it."""
     name = _key(function)
 
     @wraps(function)

@@ -39,7 +39,7 @@ from rrru.diagnosis.evidence_kernels import log_evidence_of_blocks, log_sum_exp
 from rrru.diagnosis.hypothesis import Hypothesis
 from rrru.diagnosis.marginal_problem import posterior_mean
 from rrru.diagnosis.options import OPTIONS
-from rrru.diagnosis.posterior import Posterior, Weighed, Weigher
+from rrru.diagnosis.posterior import Posterior, TermPriors, Weighed, Weigher
 from rrru.diagnosis.settings import Prior
 from rrru.diagnosis.terms import EACH, EffectTerm, on_neighbouring_legs, variants
 from rrru.diagnosis.whitened import DISCREPANCY_SCALES
@@ -91,6 +91,16 @@ class ModelSpace:
     @cached_property
     def _candidates(self) -> "Candidates":
         return Candidates(self._evidence, self._terms)
+
+    @cached_property
+    def _priors(self) -> TermPriors:
+        """Of the candidates."""
+        return self._weigher.priors_of(self._candidates.terms)
+
+    @cached_property
+    def _rows(self) -> dict[EffectTerm, int]:
+        """Number of each candidate."""
+        return {term: row for row, term in enumerate(self._candidates.terms)}
 
     def confirmed(self, first: _Search) -> Posterior:
         """The Posterior after a search, completed, and one from the other end.
@@ -205,13 +215,11 @@ class ModelSpace:
             if out is not None:
                 # a replacement of a term adds more or less than that did
                 start = self._without(centre.hypothesis, out, gains, base)
-            heights = {
-                row: start + gain + self._weigher.terms((*base.terms, self._candidates.terms[row]))
-                for row, gain in enumerate(gains.tolist())
-                if gain > -np.inf and self._candidates.terms[row] not in terms
-            }
-            rows = sorted(heights, key=lambda row: heights[row], reverse=True)
-            for rank, row in enumerate(rows):
+            heights = start + gains + self._weigher.with_each(base.terms, self._priors)
+            may_act = gains > -np.inf
+            may_act[[self._rows[term] for term in terms if term in self._rows]] = False
+            rows = np.flatnonzero(may_act)
+            for rank, row in enumerate(rows[np.argsort(-heights[rows], kind="stable")].tolist()):
                 if rank >= OPTIONS.min_neighbours and heights[row] < self._highest - OPTIONS.window_nats:
                     break
                 chosen.append((heights[row], (*base.terms, self._candidates.terms[row]), np.append(scales, best[row])))
@@ -245,8 +253,8 @@ class ModelSpace:
     def _without(self, hypothesis: Hypothesis, out: int, gains: FloatArray, smaller: Hypothesis) -> float:
         """Log evidence of a hypothesis without the term `out`, where possible by the gains (c,) of the candidates."""
         term = hypothesis.terms[out]
-        if term in self._candidates.terms:
-            return float(hypothesis.evidence.max() - gains[self._candidates.terms.index(term)])
+        if term in self._rows:
+            return float(hypothesis.evidence.max() - gains[self._rows[term]])
         return float(smaller.evidence.max())
 
     def _is_known(self, term: EffectTerm) -> bool:

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import comb
-from typing import Self
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -162,6 +162,14 @@ class Posterior:
         return np.array([effect in h.effects for h in self.hypotheses])
 
 
+class TermPriors(NamedTuple):
+    """Of terms (c,): whether each is an effect, not a discrepancy function, and log priors of its shape and legs."""
+
+    known: BoolArray
+    shape: FloatArray
+    legs: FloatArray
+
+
 class Weigher:
     """From the evidence of hypotheses to the logarithms of their weights, by the Prior.
 
@@ -200,16 +208,44 @@ class Weigher:
     def terms(self, terms: Sequence[EffectTerm]) -> float:
         """Logarithm of the prior probability of a set of terms, whatever the discrepancy."""
         known = [term for term in terms if term.effect not in UNKNOWN]
-        total = self._sets[len(known)]
-        total += (len(terms) - len(known)) * self._function
+        total = self._of_count(len(known), len(terms) - len(known))
         for term in known:
-            if term not in self._of_terms:
-                of_shape = float(self._effects[term.effect][term.shape])
-                self._of_terms[term] = of_shape, float(np.log(self._of_legs(term)))
-            of_shape, of_legs = self._of_terms[term]
+            of_shape, of_legs = self._of_term(term)
             total += of_shape
             total += of_legs
         return total
+
+    def with_each(self, terms: Sequence[EffectTerm], further: TermPriors) -> FloatArray:
+        """`terms` of a set with each (c,) of some further terms, that one last."""
+        known = [term for term in terms if term.effect not in UNKNOWN]
+        functions = len(terms) - len(known)
+        more, same = self._of_count(len(known) + 1, functions), self._of_count(len(known), functions + 1)
+        total = np.where(further.known, more, same)
+        for term in known:
+            of_shape, of_legs = self._of_term(term)
+            total += of_shape
+            total += of_legs
+        total += further.shape
+        total += further.legs
+        return total
+
+    def priors_of(self, terms: Sequence[EffectTerm]) -> TermPriors:
+        """The TermPriors of some terms."""
+        known = np.array([term.effect not in UNKNOWN for term in terms], dtype=bool)
+        each = [self._of_term(term) if one else (0.0, 0.0) for term, one in zip(terms, known, strict=True)]
+        shape, legs = np.reshape(each, (-1, 2)).T
+        return TermPriors(known, shape, legs)
+
+    def _of_count(self, known: int, functions: int) -> float:
+        """Log prior of so many effects and discrepancy functions; -inf for more effects than the library has."""
+        return self._sets[known] + functions * self._function if known < len(self._sets) else -np.inf
+
+    def _of_term(self, term: EffectTerm) -> tuple[float, float]:
+        """Log prior of the shape and of the legs of one term of the library."""
+        if term not in self._of_terms:
+            of_shape = float(self._effects[term.effect][term.shape])
+            self._of_terms[term] = of_shape, float(np.log(self._of_legs(term)))
+        return self._of_terms[term]
 
     def _of_legs(self, term: EffectTerm) -> float:
         """Prior probability of a term's legs: numbers of them are equally probable, and choices of one number, too."""

@@ -8,6 +8,7 @@ import pytest
 from scipy import stats
 from scipy.special import logsumexp
 
+from rrru.diagnosis.discrepancy_basis import UNKNOWN
 from rrru.diagnosis.hypothesis import Hypothesis
 from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.posterior import Posterior, Weigher
@@ -124,6 +125,20 @@ def test_without_data_the_probabilities_are_the_prior(arm):
     assert list(sets.values()) == sorted(sets.values(), reverse=True)
     assert found.marginal("backlash") == pytest.approx(0.5 / effects + 0.2 * (effects - 1) / pairs)
     assert found.marginal("nothing of the kind") == 0.0
+
+
+def test_the_prior_of_a_set_with_each_further_term_is_that_of_the_larger_set():
+    """To the last digit; with a term too many there is no such set."""
+    library = _three_of_an_arm()
+    weigher, terms = Weigher(_stub(library=library), Prior()), [EffectTerm("backlash"), EffectTerm("drive_compliance")]
+    unknown = [EffectTerm(name) for name in UNKNOWN]
+    further = [term for effect in library.values() for term in variants(effect)] + unknown
+    of_further = weigher.priors_of(further)
+    for present in ((), terms[:1], (*terms, *unknown[:1])):
+        found = weigher.with_each(present, of_further)
+        assert found.tolist() == [weigher.terms((*present, term)) for term in further]
+    every = [EffectTerm(name) for name in library]
+    assert np.array_equal(np.isfinite(weigher.with_each(every, of_further)), [term in unknown for term in further])
 
 
 def test_legs_have_the_prior_of_their_kinds():
