@@ -3,10 +3,11 @@
 A Gaussian process of one variable at a time is fitted to the residuals of the verdict's model with its calibration. It
 is a function f of a drive's value, or of the time, that is added to the drive and moves the positions by J f (J:
 derivative by the drive). Or it is a function of the place, the time, the payload or the speed for each axis, of the
-time for each axis of the platform and one target, or steps with the sense of motion of the drives. Its covariance is
-a^2 exp(-d^2 / (2 l^2)) of the distance d, by its values at inducing points (C. Rasmussen and C. Williams, Gaussian
-Processes for Machine Learning, 2006, sec. 8.3); a and l have the highest marginal likelihood of a grid. Each fold, a
-fifth of all stretches of five points, is predicted from the others.
+time for each axis of the platform and one target, or steps with the sense of motion of the drives. Of each the
+calibration absorbs what it absorbs of the readings. Its covariance is a^2 exp(-d^2 / (2 l^2)) of the distance d, by its
+values at inducing points (C. Rasmussen and C. Williams, Gaussian Processes for Machine Learning, 2006, sec. 8.3); a and
+l have the highest marginal likelihood of a grid. Each fold, a fifth of all stretches of five points, is predicted from
+the others.
 """
 
 from collections.abc import Collection, Iterator
@@ -56,15 +57,17 @@ def remainder_rows(inference: InferenceResult) -> pd.DataFrame:
     """
     problem = inference.problem
     rows = problem.on_robot
+    basis = _calibration_basis(inference.evidence.linear, rows)
     # a fit with a smooth discrepancy leaves to that what the calibration could absorb
-    left = _without_calibration(problem.residual(inference.state), inference.evidence.linear, rows)
+    left = _left_by_calibration(basis, problem.residual(inference.state)[rows])
     stretch = within(problem.run, problem.stop) // OPTIONS.points_per_stretch + problem.run
     fold = (stretch % OPTIONS.stretch_folds)[rows]
-    beyond = (left**2).sum() - left.size * problem.noise_mm**2
+    noise = (left.size - basis.shape[1]) * problem.noise_mm**2
+    beyond = (left**2).sum() - noise
     result = []
     for variable in _variables(inference, rows) if beyond > 0.0 else ():
-        predicted, scale = _predicted(variable, left, fold, problem.noise_mm)
-        explained = 1.0 - (((left - predicted) ** 2).sum() - left.size * problem.noise_mm**2) / beyond
+        predicted, scale = _predicted(variable, left, fold, problem.noise_mm, basis)
+        explained = 1.0 - (((left - predicted) ** 2).sum() - noise) / beyond
         rms = float(np.sqrt((predicted**2).sum(axis=1).mean()))
         result.append((variable.follows, float(np.clip(explained, 0.0, 1.0)), scale, variable.unit, rms))
     result.sort(key=lambda row: -row[1])
@@ -86,13 +89,14 @@ def followed_alike(
         return (), 0.0
     problem, linear, state = inference.problem, inference.evidence.linear, inference.state
     on_robot = problem.on_robot
+    basis = _calibration_basis(linear, on_robot)
     variable = next(one for one in _variables(inference, on_robot) if one.follows == best["follows"])
     scaled = dict(_functions(variable))
     functions = scaled[best["scale"]] if best["scale"] in scaled else next(iter(scaled.values()))
-    design = _design(variable, functions).reshape(3 * int(on_robot.sum()), -1)
+    design = _left_by_calibration(basis, _design(variable, functions)).reshape(3 * int(on_robot.sum()), -1)
     found = []
     for key, coordinates in state.effects.items():
-        part = _without_calibration(linear.columns[key] @ coordinates, linear, on_robot).ravel()
+        part = _left_by_calibration(basis, (linear.columns[key] @ coordinates)[on_robot]).ravel()
         fitted = design @ np.linalg.lstsq(design, part, rcond=1e-3)[0]
         if (
             key[0] in names
@@ -103,13 +107,18 @@ def followed_alike(
     return tuple(found), float(best["rms_mm"]) if found else 0.0
 
 
-def _without_calibration(values: FloatArray, linear: LinearizedProblem, rows: BoolArray) -> FloatArray:
-    """Residuals of values (m, 3) at some rows after a plain least-squares calibration there."""
-    chosen = values[rows]
-    columns = linear.base[rows].reshape(chosen.size, -1)
-    size = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
-    fitted = columns / size @ np.linalg.lstsq(columns / size, chosen.ravel(), rcond=1e-9)[0]
-    return np.asarray(chosen - fitted.reshape(chosen.shape))
+def _calibration_basis(linear: LinearizedProblem, rows: BoolArray) -> FloatArray:
+    """Orthonormal basis (3m, r) of what a plain least-squares calibration absorbs at some rows."""
+    chosen = linear.base[rows]
+    columns = chosen.reshape(-1, chosen.shape[-1])
+    basis, size, _ = np.linalg.svd(columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300), full_matrices=False)
+    return np.asarray(basis[:, size > 1e-9 * size.max(initial=0.0)])
+
+
+def _left_by_calibration(basis: FloatArray, values: FloatArray) -> FloatArray:
+    """Residuals of values (m, 3) or (m, 3, k) after a calibration of a basis (3m, r)."""
+    flat = values.reshape(len(basis), -1)
+    return np.asarray((flat - basis @ (basis.T @ flat)).reshape(values.shape))
 
 
 def _depends_on(effect: Effect, follows: str) -> bool:
@@ -149,9 +158,10 @@ def _variables(inference: InferenceResult, rows: BoolArray) -> list[_Variable]:
 def _shifts_of_targets(inference: InferenceResult, rows: BoolArray) -> Iterator[tuple[str, FloatArray]]:
     """Sites of targets, and what their shifts along the axes of the platform make of some rows (m, 3, 3)."""
     problem = inference.problem
-    for site in target_sites(problem.mechanism):
-        response = problem.of_rows(problem.map_of(inference.state).effect(site))
-        yield site, response[rows][..., :3]
+    if sites := target_sites(problem.mechanism):
+        reading = problem.map_of(inference.state)
+        for site in sites:
+            yield site, problem.of_rows(reading.effect(site))[rows][..., :3]
 
 
 def _of_unit_size(response: FloatArray) -> FloatArray:
@@ -164,15 +174,18 @@ def _target(site: str) -> str:
     return "the target" if site == TOOL else site
 
 
-def _predicted(variable: _Variable, left: FloatArray, fold: IntArray, noise_mm: float) -> tuple[FloatArray, float]:
+def _predicted(
+    variable: _Variable, left: FloatArray, fold: IntArray, noise_mm: float, basis: FloatArray
+) -> tuple[FloatArray, float]:
     """What a function of a variable predicts (m, 3) of the rows left out in each fold, and its scale.
 
-    left (m, 3): the remainder; fold (m,): of its rows.
+    left (m, 3): the remainder; fold (m,): of its rows; basis (3m, r): of the calibration, which absorbs its part of
+    such a function as it did of the remainder.
     """
     highest, best = -np.inf, None
     size = float(np.sqrt((left**2).mean()))
     for scale, functions in _functions(variable):
-        design = _design(variable, functions)
+        design = _left_by_calibration(basis, _design(variable, functions))
         unit = size / max(float(np.sqrt((design**2).sum(axis=-1).mean())), 1e-300)
         regression = _Regression(design * unit, left, noise_mm)
         for amplitude in _AMPLITUDES:
