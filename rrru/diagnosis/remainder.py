@@ -23,7 +23,7 @@ from rrru.diagnosis.discrepancy_basis import target_sites
 from rrru.diagnosis.heldout import within
 from rrru.diagnosis.inference import InferenceResult
 from rrru.diagnosis.options import OPTIONS
-from rrru.diagnosis.state import LinearizedProblem
+from rrru.diagnosis.state import LeftByCalibration, LinearizedProblem
 from rrru.effects.protocol import Effect
 from rrru.kinematics.legs import TOOL
 from rrru.robots.drive_words import drive_words
@@ -57,16 +57,16 @@ def remainder_rows(inference: InferenceResult) -> pd.DataFrame:
     """
     problem = inference.problem
     rows = problem.on_robot
-    basis = _calibration_basis(inference.evidence.linear, rows)
+    calibration = _calibration(inference.evidence.linear, rows)
     # a fit with a smooth discrepancy leaves to that what the calibration could absorb
-    left = _left_by_calibration(basis, problem.residual(inference.state)[rows])
+    left = _left(calibration, problem.residual(inference.state)[rows])
     stretch = within(problem.run, problem.stop) // OPTIONS.points_per_stretch + problem.run
     fold = (stretch % OPTIONS.stretch_folds)[rows]
-    noise = (left.size - basis.shape[1]) * problem.noise_mm**2
+    noise = left.size * (1.0 - calibration.taken) * problem.noise_mm**2
     beyond = (left**2).sum() - noise
     result = []
     for variable in _variables(inference, rows) if beyond > 0.0 else ():
-        predicted, scale = _predicted(variable, left, fold, problem.noise_mm, basis)
+        predicted, scale = _predicted(variable, left, fold, problem.noise_mm, calibration)
         explained = 1.0 - (((left - predicted) ** 2).sum() - noise) / beyond
         rms = float(np.sqrt((predicted**2).sum(axis=1).mean()))
         result.append((variable.follows, float(np.clip(explained, 0.0, 1.0)), scale, variable.unit, rms))
@@ -89,14 +89,14 @@ def followed_alike(
         return (), 0.0
     problem, linear, state = inference.problem, inference.evidence.linear, inference.state
     on_robot = problem.on_robot
-    basis = _calibration_basis(linear, on_robot)
+    calibration = _calibration(linear, on_robot)
     variable = next(one for one in _variables(inference, on_robot) if one.follows == best["follows"])
     scaled = dict(_functions(variable))
     functions = scaled[best["scale"]] if best["scale"] in scaled else next(iter(scaled.values()))
-    design = _left_by_calibration(basis, _design(variable, functions)).reshape(3 * int(on_robot.sum()), -1)
+    design = _left(calibration, _design(variable, functions)).reshape(3 * int(on_robot.sum()), -1)
     found = []
     for key, coordinates in state.effects.items():
-        part = _left_by_calibration(basis, (linear.columns[key] @ coordinates)[on_robot]).ravel()
+        part = _left(calibration, (linear.columns[key] @ coordinates)[on_robot]).ravel()
         fitted = design @ np.linalg.lstsq(design, part, rcond=1e-3)[0]
         if (
             key[0] in names
@@ -107,18 +107,14 @@ def followed_alike(
     return tuple(found), float(best["rms_mm"]) if found else 0.0
 
 
-def _calibration_basis(linear: LinearizedProblem, rows: BoolArray) -> FloatArray:
-    """Orthonormal basis (3m, r) of what a plain least-squares calibration absorbs at some rows."""
-    chosen = linear.base[rows]
-    columns = chosen.reshape(-1, chosen.shape[-1])
-    basis, size, _ = np.linalg.svd(columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300), full_matrices=False)
-    return np.asarray(basis[:, size > 1e-9 * size.max(initial=0.0)])
+def _calibration(linear: LinearizedProblem, rows: BoolArray) -> LeftByCalibration:
+    """What a plain least-squares calibration leaves at some rows."""
+    return LeftByCalibration(linear.at(rows).calibration_basis, np.full(int(rows.sum()), True))
 
 
-def _left_by_calibration(basis: FloatArray, values: FloatArray) -> FloatArray:
-    """Residuals of values (m, 3) or (m, 3, k) after a calibration of a basis (3m, r)."""
-    flat = values.reshape(len(basis), -1)
-    return np.asarray((flat - basis @ (basis.T @ flat)).reshape(values.shape))
+def _left(calibration: LeftByCalibration, values: FloatArray) -> FloatArray:
+    """Residuals of values (m, 3) or (m, 3, k) after a calibration."""
+    return calibration.residual(values.reshape(3 * len(values), -1)).reshape(values.shape)
 
 
 def _depends_on(effect: Effect, follows: str) -> bool:
@@ -175,17 +171,16 @@ def _target(site: str) -> str:
 
 
 def _predicted(
-    variable: _Variable, left: FloatArray, fold: IntArray, noise_mm: float, basis: FloatArray
+    variable: _Variable, left: FloatArray, fold: IntArray, noise_mm: float, calibration: LeftByCalibration
 ) -> tuple[FloatArray, float]:
     """What a function of a variable predicts (m, 3) of the rows left out in each fold, and its scale.
 
-    left (m, 3): the remainder; fold (m,): of its rows; basis (3m, r): of the calibration, which absorbs its part of
-    such a function as it did of the remainder.
+    left (m, 3): the remainder; fold (m,): of its rows; calibration: absorbs of a function what it did of the readings.
     """
     highest, best = -np.inf, None
     size = float(np.sqrt((left**2).mean()))
     for scale, functions in _functions(variable):
-        design = _left_by_calibration(basis, _design(variable, functions))
+        design = _left(calibration, _design(variable, functions))
         unit = size / max(float(np.sqrt((design**2).sum(axis=-1).mean())), 1e-300)
         regression = _Regression(design * unit, left, noise_mm)
         for amplitude in _AMPLITUDES:

@@ -8,6 +8,7 @@ import pytest
 
 from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.remainder import _Regression, followed_alike, remainder_rows
+from rrru.diagnosis.state import LinearizedProblem
 from rrru.robots.rrru3 import Rrru3
 
 NOISE_MM = 0.02
@@ -59,7 +60,7 @@ def _attribution(make, seed=0, count=240, calibration=_offsets):
         points=pd.DataFrame({"speed_mm_s": np.full(count, 80.0)}),
         residual=lambda _state: left,
     )
-    evidence = SimpleNamespace(linear=SimpleNamespace(drive=response, base=calibration(motion)))
+    evidence = SimpleNamespace(linear=LinearizedProblem(left, calibration(motion), {}, {}, {}, response))
     return SimpleNamespace(problem=problem, evidence=evidence, state=None)
 
 
@@ -127,7 +128,7 @@ def test_effects_that_make_what_the_variable_makes_are_found():
     }
     needs = {"drift": ("time_s",), "waves": (), "bend": (), "shake": ("time_s",)}
     found.problem.effects = {name: SimpleNamespace(needs=own) for name, own in needs.items()}
-    found.evidence.linear.columns = made
+    found.evidence.linear.columns.update(made)
     found.state = SimpleNamespace(effects={key: np.ones(1) for key in made})
     rows = remainder_rows(found)
     names, size = followed_alike(found, rows, tuple(needs))
