@@ -15,7 +15,7 @@ from numpy.polynomial import chebyshev
 
 from rrru.arrays import FloatArray
 from rrru.effects.protocol import Contribution, Coordinates, Effect, Motion
-from rrru.kinematics.legs import WORLD
+from rrru.kinematics.legs import TOOL, WORLD
 from rrru.kinematics.robot import Robot
 
 _DRIVE_ORDERS, _TIME_ORDERS = (1, 2, 3, 4, 5, 6), (1, 2, 3)
@@ -25,7 +25,8 @@ _DRIVE_ORDERS, _TIME_ORDERS = (1, 2, 3, 4, 5, 6), (1, 2, 3)
 class Unknown:
     """A smooth function; basis: motion to functions (n, k), or (n, K, k) of each drive, of about unit size.
 
-    per_leg: added to each actuator value, else to each axis; typical: size of coefficients in the drive's unit or mm.
+    per_leg: added to each actuator value, else to each axis of each of the sites; typical: size of coefficients in the
+    drive's unit or mm.
     """
 
     name: str
@@ -37,6 +38,7 @@ class Unknown:
     typical: float = 0.1
 
     drives: int = 3
+    sites: tuple[str, ...] = (WORLD,)
     # capabilities of an `rrru.effects.protocol.Effect` that no function has
     with_waves = None
     switches = False
@@ -54,17 +56,22 @@ class Unknown:
 
     @cached_property
     def coordinates(self) -> Coordinates:
-        """One coefficient per function and drive or axis, in the drive's unit or mm."""
-        legs = np.zeros((self.drives if self.per_leg else 3) * self.count, dtype=int)
+        """One coefficient per function and drive, or axis of a site, in the drive's unit or mm."""
+        legs = np.zeros((self.drives if self.per_leg else 3 * len(self.sites)) * self.count, dtype=int)
         return Coordinates(np.full(len(legs), self.typical), legs, legs > 0, lambda values, _: values)
 
     def contribute(self, motion: Motion, values: FloatArray) -> Contribution:
-        """Changes under coefficients (drives or axes times k,)."""
+        """Changes under coefficients (drives, or sites times axes, times k,)."""
         coefficients, functions = np.reshape(values, (-1, self.count)), self._cached(motion)
         if self.per_leg:
             return motion.at_drive_functions(self._of_each_drive(motion), coefficients)
-        shift = functions @ coefficients.T
-        return motion.at({WORLD: np.concatenate([shift, np.zeros_like(shift)], axis=1)})
+        shifts = np.split(functions @ coefficients.T, len(self.sites), axis=1)
+        return motion.at(
+            {
+                site: np.concatenate([shift, np.zeros_like(shift)], axis=1)
+                for site, shift in zip(self.sites, shifts, strict=True)
+            }
+        )
 
     def _cached(self, motion: Motion) -> FloatArray:
         """The functions along a motion, computed once."""
@@ -117,6 +124,7 @@ UNKNOWN = {
         Unknown("unknown_drive", "the drives", _of_drives, len(_DRIVE_ORDERS), (), True, 1e-4),
         Unknown("unknown_zeros", "the time, drive by drive", _of_time, len(_TIME_ORDERS), ("time_s",), True, 1e-4),
         Unknown("unknown_drift", "the time", _of_time, len(_TIME_ORDERS), ("time_s",)),
+        Unknown("unknown_targets", "the time, target by target", _of_time, len(_TIME_ORDERS), ("time_s",)),
         Unknown(
             "unknown_affine",
             "the place as a rigid motion or a change of scale does",
@@ -132,10 +140,21 @@ UNKNOWN = {
 _TYPICAL = {"rad": 1e-4, "mm": 0.01}
 
 
+def target_sites(robot: Robot) -> tuple[str, ...]:
+    """Sites of a robot's targets; none of a single one on a platform that never turns.
+
+    There a target that moves on the platform is a base that moves.
+    """
+    targets: tuple[str, ...] = robot.legs.reflectors or (TOOL,)
+    return targets if robot.orients or len(targets) > 1 else ()
+
+
 def unknown_functions(robot: Robot) -> dict[str, Unknown]:
-    """UNKNOWN for a robot's drives; for those of several units the first's typical size."""
+    """UNKNOWN for a robot's drives and targets; for drives of several units the first's typical size."""
     units = robot.parts.units
+    of_targets = replace(UNKNOWN["unknown_targets"], sites=target_sites(robot))
     return {
         name: replace(function, typical=_TYPICAL[units[0]], drives=len(units)) if function.per_leg else function
-        for name, function in UNKNOWN.items()
+        for name, function in (UNKNOWN | {of_targets.name: of_targets}).items()
+        if function.sites
     }

@@ -2,15 +2,16 @@
 
 A Gaussian process of one variable at a time is fitted to the residuals of the verdict's model with its calibration. It
 is a function f of a drive's value, or of the time, that is added to the drive and moves the positions by J f (J:
-derivative by the drive). Or it is a function of the place, the time, the payload or the speed for each axis, or steps
-with the sense of motion of the drives. Its covariance is a^2 exp(-d^2 / (2 l^2)) of the distance d, by its values at
-inducing points (C. Rasmussen and C. Williams, Gaussian Processes for Machine Learning, 2006, sec. 8.3); a and l have
-the highest marginal likelihood of a grid. Each fold, a fifth of all stretches of five points, is predicted from the
-others.
+derivative by the drive). Or it is a function of the place, the time, the payload or the speed for each axis, of the
+time for each axis of the platform and one target, or steps with the sense of motion of the drives. Of each the
+calibration absorbs what it absorbs of the readings. Its covariance is a^2 exp(-d^2 / (2 l^2)) of the distance d, by its
+values at inducing points (C. Rasmussen and C. Williams, Gaussian Processes for Machine Learning, 2006, sec. 8.3); a and
+l have the highest marginal likelihood of a grid. Each fold, a fifth of all stretches of five points, is predicted from
+the others.
 """
 
 from collections.abc import Collection, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import pandas as pd
@@ -19,12 +20,13 @@ from scipy.spatial.distance import cdist
 
 from rrru.arrays import BoolArray, FloatArray, IntArray
 from rrru.cache import cached_on
+from rrru.diagnosis.discrepancy_basis import target_sites
 from rrru.diagnosis.heldout import within
 from rrru.diagnosis.inference import InferenceResult
 from rrru.diagnosis.options import OPTIONS
-from rrru.diagnosis.problem import DiagnosisProblem
-from rrru.diagnosis.state import LinearizedProblem
+from rrru.diagnosis.state import LeftByCalibration, LinearizedProblem
 from rrru.effects.protocol import Effect
+from rrru.kinematics.legs import TOOL
 from rrru.robots.drive_words import drive_words
 
 COLUMNS = ("follows", "explained", "scale", "unit", "rms_mm")
@@ -37,14 +39,14 @@ _TIME = "the time"
 
 @dataclass(frozen=True)
 class _Variable:
-    """follows: in words; value (n, d) with its unit; drive: number of the drive that the function is added to, None
-    where it moves the positions; steps: the value itself is the function, at each of its columns.
+    """follows: in words; value (n, d) with its unit; response (n, 3, r): of the positions to the r functions, by
+    default each axis has one; steps: the value itself is the function, at each of its columns.
     """
 
     follows: str
     value: FloatArray
     unit: str
-    drive: int | None = None
+    response: FloatArray = field(default_factory=lambda: np.eye(3)[None])
     steps: bool = False
 
 
@@ -57,16 +59,17 @@ def remainder_rows(inference: InferenceResult) -> pd.DataFrame:
     """
     problem = inference.problem
     rows = problem.on_robot
-    linear = inference.evidence.linear
+    calibration = _calibration(inference.evidence.linear, rows)
     # a fit with a smooth discrepancy leaves to that what the calibration could absorb
-    left, drive = _without_calibration(problem.residual(inference.state), linear, rows), linear.drive[rows]
+    left = _left(calibration, problem.residual(inference.state)[rows])
     stretch = within(problem.run, problem.stop) // OPTIONS.points_per_stretch + problem.run
     fold = (stretch % OPTIONS.stretch_folds)[rows]
-    beyond = (left**2).sum() - left.size * problem.noise_mm**2
+    noise = left.size * (1.0 - calibration.taken) * problem.noise_mm**2
+    beyond = (left**2).sum() - noise
     result = []
-    for variable in _variables(problem, rows) if beyond > 0.0 else ():
-        predicted, scale = _predicted(variable, left, drive, fold, problem.noise_mm)
-        explained = 1.0 - (((left - predicted) ** 2).sum() - left.size * problem.noise_mm**2) / beyond
+    for variable in _variables(inference, rows) if beyond > 0.0 else ():
+        predicted, scale = _predicted(variable, left, fold, problem.noise_mm, calibration)
+        explained = 1.0 - (((left - predicted) ** 2).sum() - noise) / beyond
         rms = float(np.sqrt((predicted**2).sum(axis=1).mean()))
         result.append((variable.follows, float(np.clip(explained, 0.0, 1.0)), scale, variable.unit, rms))
     result.sort(key=lambda row: -row[1])
@@ -88,13 +91,14 @@ def followed_alike(
         return (), 0.0
     problem, linear, state = inference.problem, inference.evidence.linear, inference.state
     on_robot = problem.on_robot
-    variable = next(one for one in _variables(problem, on_robot) if one.follows == best["follows"])
+    calibration = _calibration(linear, on_robot)
+    variable = next(one for one in _variables(inference, on_robot) if one.follows == best["follows"])
     scaled = dict(_functions(variable))
     functions = scaled[best["scale"]] if best["scale"] in scaled else next(iter(scaled.values()))
-    design = _design(variable, functions, linear.drive[on_robot]).reshape(3 * int(on_robot.sum()), -1)
+    design = _left(calibration, _design(variable, functions)).reshape(3 * int(on_robot.sum()), -1)
     found = []
     for key, coordinates in state.effects.items():
-        part = _without_calibration(linear.columns[key] @ coordinates, linear, on_robot).ravel()
+        part = _left(calibration, (linear.columns[key] @ coordinates)[on_robot]).ravel()
         fitted = design @ np.linalg.lstsq(design, part, rcond=1e-3)[0]
         if (
             key[0] in names
@@ -105,13 +109,14 @@ def followed_alike(
     return tuple(found), float(best["rms_mm"]) if found else 0.0
 
 
-def _without_calibration(values: FloatArray, linear: LinearizedProblem, rows: BoolArray) -> FloatArray:
-    """Residuals of values (m, 3) at some rows after a plain least-squares calibration there."""
-    chosen = values[rows]
-    columns = linear.base[rows].reshape(chosen.size, -1)
-    size = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
-    fitted = columns / size @ np.linalg.lstsq(columns / size, chosen.ravel(), rcond=1e-9)[0]
-    return np.asarray(chosen - fitted.reshape(chosen.shape))
+def _calibration(linear: LinearizedProblem, rows: BoolArray) -> LeftByCalibration:
+    """What a plain least-squares calibration leaves at some rows."""
+    return LeftByCalibration(linear.at(rows).calibration_basis, np.full(int(rows.sum()), True))
+
+
+def _left(calibration: LeftByCalibration, values: FloatArray) -> FloatArray:
+    """Residuals of values (m, 3) or (m, 3, k) after a calibration."""
+    return calibration.residual(values.reshape(3 * len(values), -1)).reshape(values.shape)
 
 
 def _depends_on(effect: Effect, follows: str) -> bool:
@@ -119,40 +124,65 @@ def _depends_on(effect: Effect, follows: str) -> bool:
     return "time_s" in effect.needs if follows.startswith(_TIME) else not effect.needs
 
 
-def _variables(problem: DiagnosisProblem, rows: BoolArray) -> list[_Variable]:
+def _variables(inference: InferenceResult, rows: BoolArray) -> list[_Variable]:
     """The variables that may be followed at some rows (m,) of a problem, those that do not change left out."""
+    problem, drive = inference.problem, inference.evidence.linear.drive[rows]
     motion, at = problem.motion, problem.at[rows]
     words, units = drive_words(problem.mechanism), problem.mechanism.parts.units
     names = words.all_names
     found = [
-        _Variable(f"the value of {name}", motion.drive[at, k : k + 1], unit, k)
+        _Variable(f"the value of {name}", motion.drive[at, k : k + 1], unit, _of_unit_size(drive[:, :, k : k + 1]))
         for k, (name, unit) in enumerate(zip(names, units, strict=False))
     ]
     time_s = motion.time_s[at][:, None]
     found += [
-        _Variable(f"{_TIME}, as a zero offset of {name}", time_s, "s", k) for k, name in enumerate(names[: len(units)])
+        _Variable(f"{_TIME}, as a zero offset of {name}", time_s, "s", _of_unit_size(drive[:, :, k : k + 1]))
+        for k, name in enumerate(names[: len(units)])
     ]
     found.append(_Variable("the place", motion.position_mm[at], "mm"))
     found.append(_Variable(_TIME, time_s, "s"))
+    found += [
+        _Variable(f"{_TIME}, as a shift of {_target(site)}", time_s, "s", response)
+        for site, response in _shifts_of_targets(inference, rows)
+    ]
     found.append(_Variable("the payload", motion.payload_kg[at][:, None], "kg"))
     speed = problem.points["speed_mm_s"].to_numpy(dtype=float)[rows]
     found.append(_Variable("the speed", speed[:, None], "mm/s"))
     sense = np.sign(np.where(np.abs(motion.drive_rate[at]) > OPTIONS.min_drive_rate, motion.drive_rate[at], 0.0))
-    found.append(_Variable("the sense of motion of the drives", sense, "1", steps=True))
+    found.append(_Variable("the sense of motion of the drives", sense, "1", drive, steps=True))
     return [one for one in found if np.isfinite(one.value).all() and np.ptp(one.value, axis=0).max() > 0.0]
 
 
+def _shifts_of_targets(inference: InferenceResult, rows: BoolArray) -> Iterator[tuple[str, FloatArray]]:
+    """Sites of targets, and what their shifts along the axes of the platform make of some rows (m, 3, 3)."""
+    problem = inference.problem
+    if sites := target_sites(problem.mechanism):
+        reading = problem.map_of(inference.state)
+        for site in sites:
+            yield site, problem.of_rows(reading.effect(site))[rows][..., :3]
+
+
+def _of_unit_size(response: FloatArray) -> FloatArray:
+    """A response (m, 3, r) of an rms of one: the function has the drive's unit, its size is that of what it makes."""
+    return response / max(float(np.sqrt((response**2).mean())), 1e-300)
+
+
+def _target(site: str) -> str:
+    """The target of a site, in words."""
+    return "the target" if site == TOOL else site
+
+
 def _predicted(
-    variable: _Variable, left: FloatArray, drive: FloatArray, fold: IntArray, noise_mm: float
+    variable: _Variable, left: FloatArray, fold: IntArray, noise_mm: float, calibration: LeftByCalibration
 ) -> tuple[FloatArray, float]:
     """What a function of a variable predicts (m, 3) of the rows left out in each fold, and its scale.
 
-    left (m, 3): the remainder; fold (m,): of its rows; drive (m, 3, K): derivative by the actuator values.
+    left (m, 3): the remainder; fold (m,): of its rows; calibration: absorbs of a function what it did of the readings.
     """
     highest, best = -np.inf, None
     size = float(np.sqrt((left**2).mean()))
     for scale, functions in _functions(variable):
-        design = _design(variable, functions, drive)
+        design = _left(calibration, _design(variable, functions))
         unit = size / max(float(np.sqrt((design**2).sum(axis=-1).mean())), 1e-300)
         regression = _Regression(design * unit, left, noise_mm)
         for amplitude in _AMPLITUDES:
@@ -165,16 +195,12 @@ def _predicted(
     return regression.left_out(fold, amplitude), scale
 
 
-def _design(variable: _Variable, functions: FloatArray, drive: FloatArray) -> FloatArray:
-    """What functions (m, f) of a variable make of the positions (m, 3, k); drive (m, 3, K): derivative by drives."""
+def _design(variable: _Variable, functions: FloatArray) -> FloatArray:
+    """What functions (m, f) of a variable make of the positions (m, 3, k)."""
     if variable.steps:
-        return drive * functions[:, None, :]
-    if variable.drive is not None:
-        response = drive[:, :, variable.drive]
-        # the function has the drive's unit, its size is that of what it makes
-        response = response / max(float(np.sqrt((response**2).mean())), 1e-300)
-        return response[:, :, None] * functions[:, None, :]
-    return (functions[:, None, None, :] * np.eye(3)[:, :, None]).reshape(len(functions), 3, -1)
+        return variable.response * functions[:, None, :]
+    each = functions[:, None, None, :] * variable.response[..., None]
+    return each.reshape(len(functions), 3, -1)
 
 
 def _functions(variable: _Variable) -> Iterator[tuple[float, FloatArray]]:

@@ -31,7 +31,8 @@ _ORDER = (
 # names of other things in results, settings and estimates, which no effect of a user's may have
 RESERVED = (
     *("none", "unexplained", "weight", "shape", "geometry", "calibration", "sampling", "scatter", "runs", "instrument"),
-    *("unknown_drive", "unknown_zeros", "unknown_drift", "unknown_affine", "unknown_place", "unknown_load"),
+    *("unknown_drive", "unknown_zeros", "unknown_drift", "unknown_targets"),
+    *("unknown_affine", "unknown_place", "unknown_load"),
 )
 # fields of a Motion that an effect may need
 _NEEDS = tuple(one.name for one in fields(Motion) if one.name not in ("robot", "path_index", "load_slopes", "approach"))

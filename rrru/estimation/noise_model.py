@@ -65,8 +65,6 @@ _ROUNDS_OF_PRIORS = 20
 _WEIGHT_TOLERANCE, _MAX_WEIGHTINGS = 0.01, 20
 # with more columns than this the rank comes from their squares, to fewer digits
 _MANY, _RANK_OF_SQUARES = 400, 1e-12
-# rows of these that are taken at a time
-_AT_ONCE = 4000
 # of longer runs the spectrum is that of endless ones
 _LONG = 400
 
@@ -332,20 +330,46 @@ def alike(
     data (m, 3), of which columns (m, 3, k) are projected out; stop (m,): of each row; kind (m,): of reading, odd for
     orientations, which do not count; prior_sd (k,): as for `fit_noise`, over the noise. Source: Kish, Survey Sampling,
     1965, section 5.4 (design effect).
+
+    Columns that all readings of a stop share take more of what is shared than of the rest. So r is that at which the
+    products of pairs of residuals have the ratio to their squares that is expected after the projection.
     """
     counted = kind % 2 == 0
     count = np.bincount(stop[counted], minlength=stop.max() + 1).astype(float)
     if count.max() < 2.0:
         return 1.0
-    left, _ = _left(data.ravel(), columns.reshape(data.size, -1), prior_sd)
-    left = left.reshape(-1, 3)
+    basis = _basis(_with_priors(columns.reshape(data.size, -1), prior_sd))
+    ours = basis[: data.size]
+    left = (data.ravel() - ours @ (ours.T @ data.ravel())).reshape(-1, 3)
     size = np.sqrt(np.bincount(kind, (left**2).sum(axis=1)) / np.maximum(np.bincount(kind), 1))
-    unit = left[counted] / np.maximum(size, 1e-300)[kind[counted], None]
-    sums = np.stack([np.bincount(stop[counted], axis, len(count)) for axis in unit.T], axis=1)
-    squares = np.bincount(stop[counted], (unit**2).sum(axis=1), len(count))
-    # dot products of pairs over their value for identical readings of a stop
-    pairs = ((sums**2).sum(axis=1) - squares).sum()
-    share = pairs / max(((count - 1.0) * squares).sum(), 1e-300)
+    unit = left / np.maximum(size, 1e-300)[kind, None]
+    # readings of a stop along one axis, and how many others each has
+    group, own = (3 * stop[counted][:, None] + np.arange(3)).ravel(), np.flatnonzero(np.repeat(counted, 3))
+    others = np.repeat(count[stop[counted]] - 1.0, 3)
+
+    def of_pairs(values: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Sums (c, k) of the others of a stop, and values (c, k) by their number, of values (3m, k) of readings."""
+        sums = np.zeros((3 * len(count), values.shape[1]))
+        np.add.at(sums, group, values[own])
+        return sums[group] - values[own], others[:, None] * values[own]
+
+    numbers = unit.reshape(-1, 1)
+    products = [float((numbers[own] * made).sum()) for made in of_pairs(numbers)]
+    made, counts = of_pairs(ours), float(others.sum())
+    # independent readings, and identical ones, before and after the projection
+    identical = ours.copy()
+    identical[own] += made[0]
+    seen = ours.T @ identical + basis[data.size :].T @ basis[data.size :]
+    expected = []
+    for form, before in zip(made, (0.0, counts), strict=True):
+        apart = before - (ours[own] * form).sum()
+        same = counts - 2.0 * (identical[own] * form).sum() + ((ours[own].T @ form) * seen).sum()
+        expected.append((float(apart), float(same)))
+    (pairs_apart, pairs_same), (squares_apart, squares_same) = expected
+    pairs, squares = products
+    wanted = squares * pairs_apart - pairs * squares_apart
+    slope = pairs * (squares_same - squares_apart) - squares * (pairs_same - pairs_apart)
+    share = wanted / slope if abs(slope) > 1e-300 else 0.0
     mean = (count**2).sum() / count.sum()
     return float(1.0 + (mean - 1.0) * np.clip(share, 0.0, 1.0))
 
@@ -369,6 +393,13 @@ def _spectrum(correlation: float, count: int) -> FloatArray:
     return np.diag(dct(dct(covariance, axis=0, norm="ortho"), axis=1, norm="ortho")).copy()
 
 
+def _with_priors(columns: FloatArray, prior_sd: FloatArray | None) -> FloatArray:
+    """Columns (n, k), and below them the readings of their coefficients that priors of s.d. (k,) are."""
+    if prior_sd is None:
+        return columns
+    return np.concatenate([columns, np.diag(1.0 / prior_sd)[np.isfinite(prior_sd)]])
+
+
 def _left(data: FloatArray, columns: FloatArray, prior_sd: FloatArray | None = None) -> tuple[FloatArray, FloatArray]:
     """Data (n,) projected off columns (n, k), and the share (n,) of each row's variance that remains.
 
@@ -377,26 +408,22 @@ def _left(data: FloatArray, columns: FloatArray, prior_sd: FloatArray | None = N
     """
     if not columns.size:
         return data, np.ones(len(data))
-    if prior_sd is not None and np.isfinite(prior_sd).any():
-        # a prior is a reading of its coefficient
-        count = len(data)
-        readings = np.diag(1.0 / prior_sd)[np.isfinite(prior_sd)]
-        left, share = _left(np.append(data, np.zeros(len(readings))), np.concatenate([columns, readings]))
-        return left[:count], share[:count]
+    basis = _basis(_with_priors(columns, prior_sd))[: len(data)]
+    return data - basis @ (basis.T @ data), np.clip(1.0 - (basis**2).sum(axis=1), 0.0, 1.0)
+
+
+def _basis(columns: FloatArray) -> FloatArray:
+    """Orthonormal basis (n, r) of columns (n, k), without combinations that rounding makes."""
     size = np.linalg.norm(columns, axis=0)
     unit = columns / np.where(size > 0.0, size, 1.0)
     if columns.shape[1] > _MANY:
         value, turned = np.linalg.eigh(unit.T @ unit)
         independent = value > _RANK_OF_SQUARES * value[-1]
-        root = turned[:, independent] / np.sqrt(value[independent])
-        parts = np.array_split(unit, len(unit) // _AT_ONCE + 1)
-        taken = np.concatenate([((part @ root) ** 2).sum(axis=1) for part in parts])
-        return data - unit @ (root @ (root.T @ (unit.T @ data))), np.clip(1.0 - taken, 0.0, 1.0)
+        return np.asarray(unit @ (turned[:, independent] / np.sqrt(value[independent])))
     # the pivots of the triangle are those of the columns, and are found in a fraction of the time
     basis, triangle = qr(unit, mode="economic", check_finite=False)
     turned, pivots, _ = qr(triangle, mode="economic", pivoting=True)
-    basis = basis @ turned[:, np.abs(np.diag(pivots)) > _RANK * np.abs(pivots[0, 0])]
-    return data - basis @ (basis.T @ data), np.clip(1.0 - (basis**2).sum(axis=1), 0.0, 1.0)
+    return np.asarray(basis @ turned[:, np.abs(np.diag(pivots)) > _RANK * np.abs(pivots[0, 0])])
 
 
 @dataclass(frozen=True)

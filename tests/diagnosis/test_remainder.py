@@ -8,14 +8,30 @@ import pytest
 
 from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.remainder import _Regression, followed_alike, remainder_rows
+from rrru.diagnosis.state import LinearizedProblem
 from rrru.robots.rrru3 import Rrru3
 
 NOISE_MM = 0.02
 ROBOT = Rrru3()
 
 
-def _attribution(make, seed=0, count=240):
-    """A made-up InferenceResult: twelve runs of twenty points; make: from motion and drives' derivatives to (m, 3)."""
+def _offsets(motion):
+    """Three offsets of all positions."""
+    return np.broadcast_to(np.eye(3), (len(motion.time_s), 3, 3))
+
+
+def _waves_of_the_place(motion):
+    """Waves along each axis, two of each length, that move each axis."""
+    angle = motion.position_mm[:, :, None] * np.pi / np.array([600.0, 300.0, 200.0])
+    waves = np.concatenate([np.sin(angle), np.cos(angle)], axis=-1).reshape(len(angle), -1)
+    return np.concatenate([_offsets(motion), np.einsum("mk,ab->mabk", waves, np.eye(3)).reshape(len(waves), 3, -1)], -1)
+
+
+def _attribution(make, seed=0, count=240, calibration=_offsets):
+    """A made-up InferenceResult: twelve runs of twenty points.
+
+    make: from motion and drives' derivatives to (m, 3); calibration: from the motion to its columns (m, 3, k).
+    """
     generator = np.random.default_rng(seed)
     along = np.tile(np.linspace(0.0, 1.0, 20), count // 20)
     start = np.repeat(generator.uniform(-1.0, 1.0, (count // 20, 3)), 20, axis=0)
@@ -44,9 +60,7 @@ def _attribution(make, seed=0, count=240):
         points=pd.DataFrame({"speed_mm_s": np.full(count, 80.0)}),
         residual=lambda _state: left,
     )
-    # three offsets of all positions are the calibration
-    base = np.broadcast_to(np.eye(3), (count, 3, 3))
-    evidence = SimpleNamespace(linear=SimpleNamespace(drive=response, base=base))
+    evidence = SimpleNamespace(linear=LinearizedProblem(left, calibration(motion), {}, {}, {}, response))
     return SimpleNamespace(problem=problem, evidence=evidence, state=None)
 
 
@@ -72,8 +86,9 @@ def test_the_variable_that_makes_it_is_found(follows, seed):
 def test_noise_follows_nothing(seed):
     """Four times the noise that is stated: much is left, and nothing predicts it."""
     noise = np.random.default_rng(100 + seed).standard_normal((240, 3))
-    rows = remainder_rows(_attribution(lambda *_: 4.0 * NOISE_MM * noise, seed))
-    assert rows["explained"].max() < 0.1
+    for calibration in (_offsets, _waves_of_the_place):
+        rows = remainder_rows(_attribution(lambda *_: 4.0 * NOISE_MM * noise, seed, calibration=calibration))
+        assert rows["explained"].max() < 0.1
 
 
 def test_left_out_predictions_are_those_of_fits_without_the_fold():
@@ -113,7 +128,7 @@ def test_effects_that_make_what_the_variable_makes_are_found():
     }
     needs = {"drift": ("time_s",), "waves": (), "bend": (), "shake": ("time_s",)}
     found.problem.effects = {name: SimpleNamespace(needs=own) for name, own in needs.items()}
-    found.evidence.linear.columns = made
+    found.evidence.linear.columns.update(made)
     found.state = SimpleNamespace(effects={key: np.ones(1) for key in made})
     rows = remainder_rows(found)
     names, size = followed_alike(found, rows, tuple(needs))
@@ -127,3 +142,10 @@ def test_what_the_calibration_could_take_away_is_no_part_of_it():
     found = remainder_rows(_attribution(_MADE["the time"], 1))
     moved = remainder_rows(_attribution(lambda *given: np.add(_MADE["the time"](*given), [0.5, -0.3, 0.2]), 1))
     pd.testing.assert_frame_equal(found, moved, rtol=1e-6)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_the_calibration_absorbs_of_a_function_what_it_absorbed_of_the_readings(seed):
+    """What a calibration of many parameters leaves of a function of a drive is no function of the drive alone."""
+    rows = remainder_rows(_attribution(_MADE["the value of leg 2"], seed, calibration=_waves_of_the_place))
+    assert rows["follows"].iloc[0] == "the value of leg 2" and rows["explained"].iloc[0] > 0.8

@@ -122,8 +122,8 @@ def test_the_scatter_of_an_arm_with_three_reflectors_is_seen(scatter_mm, share):
         linear = problem.linearise(calibrate(problem))
         columns = np.concatenate([linear.base, *linear.columns.values()], axis=-1)
         found.append(alike(linear.data, columns, problem.stop, problem.kind))
-    # numbers that are fitted take more of what is shared than of the rest
-    assert np.mean(found) == pytest.approx(1.0 + 2.0 * share, abs=0.2)
+    # parameters that are fitted absorb more of what is shared than of the rest, which is taken into account
+    assert np.mean(found) == pytest.approx(1.0 + 2.0 * share, abs=0.06)
 
 
 @pytest.mark.parametrize("turned", [False, True])
