@@ -67,13 +67,20 @@ class Estimate:
         return cls(problem, values, covariance, ~free, end)
 
     @classmethod
-    def over_cases(cls, whole: Self, cases: Sequence[tuple[float, Self]]) -> Self:
-        """The Estimate with values and end of `whole` and the covariance of a mixture of `Estimate.cases`."""
+    def over_cases(
+        cls,
+        problem: Problem,
+        values: FloatArray,
+        at_bound: BoolArray,
+        end: SearchEnd,
+        cases: Sequence[tuple[float, Self]],
+    ) -> Self:
+        """The Estimate at values (p,) with the covariance of a mixture of `Estimate.cases`."""
         share, means = np.array([share for share, _ in cases]), np.array([one.values for _, one in cases])
         apart = means - share @ means
         spread = sum(share * one.covariance for share, one in cases)
-        covariance = spread + np.einsum("c,ci,cj->ij", share, apart, apart)
-        return replace(whole, covariance=covariance, cases=tuple(cases))
+        covariance = np.asarray(spread + np.einsum("c,ci,cj->ij", share, apart, apart))
+        return cls(problem, values, covariance, at_bound, end, tuple(cases))
 
     @cached_property
     def readings_triangle(self) -> FloatArray:

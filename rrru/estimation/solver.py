@@ -91,8 +91,7 @@ def solve(
     starts = [problem.parameters.mean] if starts is None else list(starts)
     if problem.parameters.mixed.any():
         return _solve_cases(problem, starts, options)
-    search = _best(problem, starts, options)
-    return search.estimate()
+    return _best(problem, starts, options).estimate()
 
 
 def _best(
@@ -124,7 +123,8 @@ def _solve_cases(problem: Problem, starts: Sequence[npt.ArrayLike], options: Sol
         starts = [search.values]
     log = _log_evidences(found, mixed)
     share = np.exp(log - logsumexp(log))
-    share = np.where(share > _LEAST_SHARE, share, 0.0) / share[share > _LEAST_SHARE].sum()
+    share[share < _LEAST_SHARE] = 0.0
+    share /= share.sum()
     start = found[int(share.argmax())].values.copy()
     start[mixed] = share @ np.array([one.values[mixed] for one in found])
     search = _best(problem, [start], options, mixed)
@@ -138,7 +138,7 @@ def _solve_cases(problem: Problem, starts: Sequence[npt.ArrayLike], options: Sol
     )
     at_bound = np.where(mixed, np.all([one.at_bound for one in found], axis=0), ~search.free)
     cases = [(share, one) for share, one in zip(share.tolist(), found, strict=True) if share]
-    return Estimate.over_cases(Estimate(problem, search.values, cases[0][1].covariance, at_bound, end), cases)
+    return Estimate.over_cases(problem, search.values, at_bound, end, cases)
 
 
 def _log_evidences(cases: Sequence[Estimate], mixed: BoolArray) -> FloatArray:
