@@ -80,7 +80,7 @@ def test_the_right_answer_is_a_law_that_the_diagnosis_tries_or_none(kind):
         assert fault.truth == f"{PREFIX}:{kind}" and fault.effect == kind and not fault.numbers(robot)
     elif KINDS[kind].effect_model is None:
         assert fault.truth == NONE and not fault.effect
-        # the calibration represents it: on 45 points, more than it has parameters, 5 % of the noise are left
+        # the calibration represents it: on 45 points, more than it has parameters, 5 % of the noise are left at most
         assert (
             robots.gap_over_noise(
                 short("own", file, (fault,), across_mm=(-40.0, 0.0, 40.0), points=5), conditions(file)
