@@ -16,6 +16,7 @@ import html
 import re
 import tempfile
 from collections.abc import Mapping, Sequence
+from concurrent.futures import Executor
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -29,7 +30,7 @@ from rrru.diagnosis.diagnose import STEPS
 from rrru.diagnosis.diagnose import Diagnosis as CoreDiagnosis
 from rrru.diagnosis.verdict_facts import NOT_CORRECTED
 from rrru.errors import ConfigError, IngestError, RrruError, not_a_file
-from rrru.figures.drawing import draw, draw_all
+from rrru.figures.drawing import draw, draw_all, requests
 from rrru.figures.files import figure_paths, with_svg
 from rrru.kinematics.robot import Robot
 from rrru.pipeline import config as parts
@@ -292,12 +293,12 @@ class DiagnosisResult:
         lost = self.result.verdict["not_in_model"]
         return lost if lost.startswith(NOT_CORRECTED) else ""
 
-    def write(self, folder: str | Path, figures: Sequence[str] = ()) -> Path:
+    def write(self, folder: str | Path, figures: Sequence[str] = (), *, processes: Executor | None = None) -> Path:
         """Write page, JSON, tables, figures and corrected file of the campaign into a folder of results.
 
         figures: kinds of the figures' files besides SVG, "pdf" and "png"; a figure that is too large for the page as
-        SVG is a PNG there. Returns the path of the page. A page of the workflow for the same campaign and configuration
-        has the same bytes. Raises ConfigError for another kind.
+        SVG is a PNG there; processes: to draw in, see `rrru.figures.processes`. Returns the path of the page. A page of
+        the workflow for the same campaign and configuration has the same bytes. Raises ConfigError for another kind.
         """
         kinds = with_svg(figures)
         name, config, folder = self.campaign.name, self.campaign.config, Path(folder)
@@ -311,8 +312,10 @@ class DiagnosisResult:
         settings = parts.calibration_settings(config, name, driven=True)
         compensate_job.write(compensate_job.compensate(settings, frames | genetic), paths)
         done = self._corrected(paths["corrected"]) if "corrected" in paths else self
-        diagnose_job.write(self._settings, done.result, self._robot, paths, kinds)
-        draw_all(CAMPAIGN_FIGURES, paths, parts.figure_options(config, name), paths, kinds)
+        diagnose_job.write(self._settings, done.result, self._robot, paths)
+        drawings = diagnose_job.figures(self._settings, self._robot, paths, kinds)
+        drawings += requests(CAMPAIGN_FIGURES, paths, parts.figure_options(config, name), paths, kinds)
+        draw_all(drawings, processes)
         target = Path(folder, "campaigns", name, "report.html")
         page.write(str(folder), str(target), "", name)
         return target

@@ -12,7 +12,7 @@ import shutil
 import sys
 import textwrap
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, NoReturn
@@ -53,18 +53,18 @@ class _Parser(argparse.ArgumentParser):
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; returns its exit code. arguments: None for those of the process, which then ends with it."""
     if arguments is not None:
-        return _run(arguments)
+        return _run(_parser().parse_args(arguments))
     # searches for garbage, one of them as the process ends, cost 0.3 s and free little
     gc.disable()
+    options = _parser().parse_args(namespace=argparse.Namespace(alone=True))
     try:
-        return _run(sys.argv[1:])
+        return _run(options)
     finally:
         gc.freeze()
 
 
-def _run(arguments: Sequence[str]) -> int:
-    """Run the command with arguments; returns its exit code."""
-    options = _parser().parse_args(arguments)
+def _run(options: argparse.Namespace) -> int:
+    """Run the command with its options; returns its exit code."""
     # libraries that compute with several threads give other last digits, and are slower on matrices of this size
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(name, "1")
@@ -271,21 +271,25 @@ def _names(text: str) -> list[str]:
 
 def _diagnose(options: argparse.Namespace) -> int:
     """Read, calibrate and diagnose a campaign; write its results and print the answer."""
-    from rrru import api
-    from rrru.figures.files import with_svg
+    from rrru.figures.processes import drawing_processes
 
-    config, name = _stated(options)
-    if "robot" not in config["campaigns"][name]:
-        known = ", ".join(config["robots"])
-        raise ConfigError(f"no robot is stated; allowed: --robot with a URDF or MJCF file, or one of {known}")
-    _require_writable(Path(options.out))
-    kinds = with_svg(options.figures)
-    terminal = sys.stderr.isatty()
-    with _during("file", terminal):
-        campaign = api.configured_campaign(name, config)
-    diagnosis = api.diagnose(campaign, effects=options.effects, progress=terminal)
-    with _during("page, tables and figures", terminal):
-        page = diagnosis.write(options.out, kinds)
+    # they start before this process loads what it computes with; those of another program would import it anew
+    with drawing_processes() if "alone" in options else nullcontext() as processes:
+        from rrru import api
+        from rrru.figures.files import with_svg
+
+        config, name = _stated(options)
+        if "robot" not in config["campaigns"][name]:
+            known = ", ".join(config["robots"])
+            raise ConfigError(f"no robot is stated; allowed: --robot with a URDF or MJCF file, or one of {known}")
+        _require_writable(Path(options.out))
+        kinds = with_svg(options.figures)
+        terminal = sys.stderr.isatty()
+        with _during("file", terminal):
+            campaign = api.configured_campaign(name, config)
+        diagnosis = api.diagnose(campaign, effects=options.effects, progress=terminal)
+        with _during("page, tables and figures", terminal):
+            page = diagnosis.write(options.out, kinds, processes=processes)
     if options.json:
         print(page.with_name("verdict.json").read_text(encoding="utf-8"), end="")
     else:

@@ -6,7 +6,7 @@ from pathlib import Path
 import pandas as pd
 
 from rrru.diagnosis.settings import GapSettings
-from rrru.figures.drawing import draw_all
+from rrru.figures.drawing import draw_all, requests
 from rrru.store import tables
 from rrru.store.job import run, tell
 from rrru.studies.real.carry import carried, model
@@ -27,7 +27,7 @@ def main(settings, inputs, outputs):
         frames[table.name] = pd.concat(whole, ignore_index=True) if whole else pd.DataFrame(columns=table.names)
     frames["real_carried"] = _carried(series, settings, inputs)
     tables.write_all(TABLES, frames, outputs)
-    draw_all(settings["figures"], {key: outputs[key] for key in frames}, {"set": name}, outputs)
+    draw_all(requests(settings["figures"], {key: outputs[key] for key in frames}, {"set": name}, outputs))
 
 
 def _carried(series, settings, inputs):

@@ -3,7 +3,7 @@
 import pandas as pd
 
 from rrru.errors import RrruError
-from rrru.figures.drawing import draw_all
+from rrru.figures.drawing import draw_all, requests
 from rrru.store import tables
 from rrru.store.job import run, tell
 from rrru.studies.real import belts, cables
@@ -25,7 +25,7 @@ def main(settings, inputs, outputs):
         whole = pd.concat(parts, ignore_index=True) if parts else pd.DataFrame()
         frames[table.name] = whole.reindex(columns=table.names)
     tables.write_all(TABLES, frames, outputs)
-    draw_all(settings["figures"], {key: outputs[key] for key in frames}, {"set": name}, outputs)
+    draw_all(requests(settings["figures"], {key: outputs[key] for key in frames}, {"set": name}, outputs))
 
 
 def _tables(series, study):

@@ -11,7 +11,7 @@ from rrru.diagnosis.design.run_limits import StatedLimits
 from rrru.diagnosis.schemas import TABLES, tables_of
 from rrru.diagnosis.settings import GapSettings
 from rrru.diagnosis.verdict_facts import answer
-from rrru.figures.drawing import draw_all
+from rrru.figures.drawing import FigureRequest, draw_all, requests
 from rrru.figures.files import KINDS
 from rrru.kinematics.dynamics import Masses
 from rrru.kinematics.robot import Robot
@@ -26,7 +26,9 @@ def main(settings: Mapping[str, Any], inputs: Mapping[str, str], outputs: Mappin
     result = diagnose(settings, measurements)
     if "corrected" in outputs:
         result = with_corrected(settings, result, outputs["corrected"])
-    write(settings, result, setup.measured_robot(settings["robot"], measurements), outputs)
+    nominal = setup.measured_robot(settings["robot"], measurements)
+    write(settings, result, nominal, outputs)
+    draw_all(figures(settings, nominal, outputs))
 
 
 def diagnose(
@@ -77,22 +79,17 @@ def frames_of(settings: Mapping[str, Any], result: core.Diagnosis) -> dict[str, 
     }
 
 
-def write(
-    settings: Mapping[str, Any],
-    result: core.Diagnosis,
-    nominal: Robot,
-    paths: Mapping[str, str],
-    kinds: Collection[str] = KINDS,
-) -> None:
-    """Write verdict, tables and figures of a Diagnosis to paths by name.
-
-    nominal: the robot as measured; kinds: of the figures' files, see `draw_all`.
-    """
+def write(settings: Mapping[str, Any], result: core.Diagnosis, nominal: Robot, paths: Mapping[str, str]) -> None:
+    """Write verdict and tables of a Diagnosis to paths by name; nominal: the robot as measured."""
     json_files.write(facts(settings, result, nominal), paths["verdict"])
-    frames = frames_of(settings, result)
-    tables.write_all(tables_of(nominal), frames, paths)
-    options = figure_options(settings, nominal)
-    draw_all(settings["figures"], {name: paths[name] for name in frames}, options, paths, kinds)
+    tables.write_all(tables_of(nominal), frames_of(settings, result), paths)
+
+
+def figures(
+    settings: Mapping[str, Any], nominal: Robot, paths: Mapping[str, str], kinds: Collection[str] = KINDS
+) -> list[FigureRequest]:
+    """Figures of a Diagnosis from the tables that `write` has written; kinds: of the files, see `requests`."""
+    return requests(settings["figures"], paths, figure_options(settings, nominal), paths, kinds)
 
 
 def figure_options(settings: Mapping[str, Any], nominal: Robot) -> dict[str, Any]:
