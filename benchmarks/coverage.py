@@ -86,7 +86,7 @@ def state_of(campaign, frame, noise_mm, draws=_RESAMPLES):
     names = found.verdict["effects"].split("+")
     return Statement(
         found.tables["gap_parameters"],
-        estimate.covariance[geometry, geometry],
+        found.inference.fit.stated.covariance[geometry, geometry],
         frozenset(names) - {"none", "unexplained"},
         found.verdict,
         float(np.sqrt(expected.mean())),

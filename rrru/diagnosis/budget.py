@@ -6,17 +6,19 @@ confounded effects, with the error of the calibration itself, are the gap: in ev
 was measured differs from that by the products of errors and noise ("sampling"), which are no error of the robot.
 """
 
+from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
 import pandas as pd
 from scipy.special import ndtr
 
-from rrru.arrays import BoolArray, FloatArray
+from rrru.arrays import BoolArray, FloatArray, IntArray
 from rrru.diagnosis.discrepancy_basis import UNKNOWN
 from rrru.diagnosis.evidence import ModelEvidence
-from rrru.diagnosis.hypothesis import Hypothesis
+from rrru.diagnosis.hypothesis import Answer, Hypothesis
 from rrru.diagnosis.inference import InferenceResult
+from rrru.diagnosis.model_fit import ModelFit
 from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.state import LeftByCalibration
 from rrru.diagnosis.terms import signatures, spread
@@ -29,55 +31,80 @@ _UNEXPLAINED = "unexplained"
 def budget(
     inference: InferenceResult, stated_mm: float | None, generator: np.random.Generator, draws: int
 ) -> pd.DataFrame:
-    """Rows of `gap_budget` without the campaign; stated_mm: the instrument's noise per axis, None where unknown."""
+    """Rows of `gap_budget` without the campaign; stated_mm: the instrument's noise per axis, None where unknown.
+
+    Intervals have the errors that a discrepancy makes in the coefficients, see `ModelFit.bias`. In a mean square they
+    would count twice, as the estimated coefficients have them already.
+    """
     left = LeftByCalibration(inference.evidence.linear.calibration_basis, inference.problem.on_robot)
-    squares, acting, products = _drawn(inference, left, generator, draws)
+    posterior = inference.posterior
+    drawn = _drawn(inference, left, generator, draws)
     instrument_mm2, noise = _noise_parts(inference, stated_mm, generator, draws)
     residual = inference.problem.residual(inference.calibrated)
     instrument = float(instrument_mm2.mean())
     # the residuals have the share of the noise that the calibration leaves
     measured = float((residual[inference.problem.on_robot] ** 2).sum(axis=1).mean()) - instrument * (1.0 - left.taken)
-    posterior = inference.posterior
-    unexplained = squares.pop(_UNEXPLAINED)
-    rows = [(name, "effect", drawn, posterior.marginal(name)) for name, drawn in squares.items()]
-    rows += [(name, name, *drawn) for name, drawn in noise.items()]
-    rows.append((_UNEXPLAINED, _UNEXPLAINED, unexplained, posterior.probability_unexplained))
-    least = OPTIONS.min_covariance_share * max(measured, 1e-12)
-    large = {pair: drawn for pair, drawn in products.items() if abs(drawn.mean()) > least}
-    rows += [(" and ".join(pair), "covariance", drawn, np.nan) for pair, drawn in large.items()]
-    parts = np.sum([drawn for _, _, drawn, _ in rows], axis=0)
     calibration = instrument / 3.0 * left.error(generator, draws)
-    rows.append(("sampling", "sampling", np.array([measured - parts.mean()]), np.nan))
-    rows.append(("calibration", "calibration", calibration, np.nan))
-    whole = parts + calibration
-    given = {name: acts for name, acts in acting.items() if posterior.marginal(name) >= OPTIONS.min_named_probability}
-    made = [_row(*row, whole, given.get(row[0]) if row[1] == "effect" else None) for row in rows]
-    return pd.DataFrame(made, columns=COLUMNS)
+    biased = drawn if inference.fit.bias is None else _drawn(inference, left, generator, draws, biased=True)
+    least = OPTIONS.min_covariance_share * max(measured, 1e-12)
+    pairs = [pair for pair, some in drawn.products.items() if abs(some.mean()) > least]
+    parts, wide = (
+        {(name, "effect"): one.squares[name] for name in one.acting}
+        | {(name, name): some for name, (some, _) in noise.items()}
+        | {(_UNEXPLAINED, _UNEXPLAINED): one.squares[_UNEXPLAINED]}
+        | {(" and ".join(pair), "covariance"): one.products[pair] for pair in pairs}
+        for one in (drawn, biased)
+    )
+    sampling = np.array([measured - np.sum([*parts.values()], axis=0).mean()])
+    rest = {("sampling", "sampling"): sampling, ("calibration", "calibration"): calibration}
+    whole, wide_whole = (np.sum([*some.values(), calibration], axis=0) for some in (parts, wide))
+    probability = {name: chance for name, (_, chance) in noise.items()}
+    probability |= {name: posterior.marginal(name) for name in drawn.acting}
+    probability[_UNEXPLAINED] = posterior.probability_unexplained
+    rows = []
+    for (part, kind), squares in (parts | rest).items():
+        shares = (wide | rest)[part, kind] / np.where(wide_whole > 0.0, wide_whole, np.inf)
+        chance = probability.get(part, np.nan)
+        given = biased.acting[part] if kind == "effect" and chance >= OPTIONS.min_named_probability else None
+        rows.append((part, kind, *_numbers(squares, float(whole.mean()), shares, given), chance))
+    return pd.DataFrame(rows, columns=COLUMNS)
 
 
-def _row(
-    part: str, kind: str, squares: FloatArray, probability: float, whole: FloatArray, given: BoolArray | None = None
-) -> tuple[str, str, float, float, float, float, float]:
-    """One row of draws (b,) of a mean square, which may be negative where it is a product, and of the gap (b,).
+def _numbers(
+    squares: FloatArray, total: float, shares: FloatArray, given: BoolArray | None = None
+) -> tuple[float, float, float, float]:
+    """Signed rms, share and its interval from draws (b,) of a mean square, which is negative where a product is.
 
-    given: draws (b,) that the interval is of, None for all. That of an effect that is probable enough for a name is
-    that given that it acts: how probable that is has a column of its own.
+    total: mean square of the whole gap; shares (b,): draws of the interval; given (b,): those that it is of, None for
+    all. That of an effect that is probable enough for a name is that given that it acts: how probable that is has a
+    column of its own.
     """
-    mean, total = float(squares.mean()), float(whole.mean())
-    shares = squares / np.where(whole > 0.0, whole, np.inf)
-    counted = shares if given is None else shares[given]
+    mean = float(squares.mean())
     share = mean / total if total > 0.0 else 0.0
+    counted = shares if given is None else shares[given]
     low, high = np.quantile(counted, OPTIONS.interval_quantiles) if len(counted) else (share, share)
-    rms = float(np.sign(mean) * np.sqrt(abs(mean)))
-    return part, kind, rms, share, float(min(low, share)), float(max(high, share)), float(probability)
+    return float(np.sign(mean) * np.sqrt(abs(mean))), share, float(min(low, share)), float(max(high, share))
+
+
+@dataclass(frozen=True)
+class _Drawn:
+    """Draws (b,) of mean squares by name, of effects and of what is unexplained, in which of them each effect acts, and
+    draws of twice the products of two parts.
+    """
+
+    squares: dict[str, FloatArray]
+    acting: dict[str, BoolArray]
+    products: dict[tuple[str, str], FloatArray]
 
 
 def _drawn(
-    inference: InferenceResult, left: LeftByCalibration, generator: np.random.Generator, draws: int
-) -> tuple[dict[str, FloatArray], dict[str, BoolArray], dict[tuple[str, str], FloatArray]]:
-    """Draws (b,) of mean squares, of effects and of what is unexplained, by name, in which of them each acts, and draws
-    of products of two of them.
-    """
+    inference: InferenceResult,
+    left: LeftByCalibration,
+    generator: np.random.Generator,
+    draws: int,
+    biased: bool = False,
+) -> _Drawn:
+    """The draws; biased: with the errors that a discrepancy makes in the coefficients."""
     problem, evidence, posterior = inference.problem, inference.evidence, inference.posterior
     linear, lacks_fit = evidence.linear, inference.lacks_fit
     data, count = left.residual(linear.data.reshape(-1, 1)), int(problem.on_robot.sum())
@@ -91,7 +118,8 @@ def _drawn(
         row, level = map(int, np.unravel_index(number, posterior.weights.shape))
         some = slice(first, first + counts[number])
         first = some.stop
-        parts = _parts(evidence, posterior.hypotheses[row], level, left, generator, counts[number])
+        answer = posterior.hypotheses[row], level
+        parts = _parts(evidence, answer, left, generator, counts[number], inference.fit if biased else None)
         for name in set(parts) & set(squares):
             squares[name][some] = (parts[name] ** 2).sum(axis=0) / count
         for name in set(parts) & set(acting):
@@ -103,24 +131,29 @@ def _drawn(
             beyond = data - sum(parts.values(), np.zeros((len(data), counts[number])))
             spare = 3.0 * problem.noise_mm**2 * (1.0 - left.taken)
             squares[_UNEXPLAINED][some] += np.maximum((beyond**2).sum(axis=0) / count - spare, 0.0)
-    return squares, acting, products
+    return _Drawn(squares, acting, products)
 
 
 def _parts(
     evidence: ModelEvidence,
-    hypothesis: Hypothesis,
-    level: int,
+    answer: Answer,
     left: LeftByCalibration,
     generator: np.random.Generator,
     count: int,
+    biased: ModelFit | None = None,
 ) -> dict[str, FloatArray]:
     """By effect of a hypothesis its part of the gap (3n, count) beyond the calibration, at drawn coefficients.
 
-    left: a LeftByCalibration. Those of discrepancy functions together are the unexplained part.
+    answer: a hypothesis and its discrepancy level; left: a LeftByCalibration; biased: a fit whose bias counts for terms
+    that it has, None for a complete model. Discrepancy functions together are the unexplained part.
     """
+    hypothesis, level = answer
     if not hypothesis.terms:
         return {}
     mean, covariance = evidence.coefficients(hypothesis.terms, hypothesis.prior_scales[level], level)
+    if biased is not None and biased.bias is not None:
+        own, of_fit = _places(evidence, hypothesis, biased)
+        covariance[np.ix_(own, own)] += biased.bias[np.ix_(of_fit, of_fit)]
     # coefficients have very different sizes
     unit = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
     size, turned = np.linalg.eigh(covariance / np.outer(unit, unit))
@@ -144,6 +177,19 @@ def _parts(
         name = _UNEXPLAINED if term.effect in UNKNOWN else term.effect
         result[name] = result.get(name, 0.0) + left.residual(part)
     return result
+
+
+def _places(evidence: ModelEvidence, hypothesis: Hypothesis, fit: ModelFit) -> tuple[IntArray, IntArray]:
+    """Numbers (k,) of the coefficients of a hypothesis that a fit has, too, and those of the fit's parameters."""
+    slices, count = fit.estimate.parameters.slices, len(fit.estimate.values)
+    own, of_fit, start = [np.zeros(0, dtype=int)], [np.zeros(0, dtype=int)], 0
+    for term in hypothesis.terms:
+        stop = start + spread(evidence.library[term.effect].coordinates, term.legs).shape[1]
+        if term in fit.terms:
+            own.append(np.arange(start, stop))
+            of_fit.append(np.arange(count)[slices[term.effect]])
+        start = stop
+    return np.concatenate(own), np.concatenate(of_fit)
 
 
 def _noise_parts(

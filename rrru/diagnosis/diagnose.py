@@ -14,6 +14,7 @@ from rrru.diagnosis.budget import budget
 from rrru.diagnosis.design.advise import Advice, advise
 from rrru.diagnosis.design.run_limits import StatedLimits
 from rrru.diagnosis.determined import few_readings, require_determined
+from rrru.diagnosis.discrepancy_bias import discrepancy_covariance
 from rrru.diagnosis.drive_functions import drive_functions
 from rrru.diagnosis.inference import (
     KNOWN,
@@ -143,6 +144,8 @@ def diagnose(
     verdict, inference, ordered = _decide(infer(problem, settings.prior, stated), settings.prior)
     if why := why_no_answer(inference, robot.noise_mm):
         verdict, inference, ordered = without_answer(why), _without_effects(inference, settings.prior), ()
+    elif verdict.unexplained:
+        inference = replace(inference, fit=replace(inference.fit, bias=discrepancy_covariance(inference.fit)))
     begin(STEPS[2])
     terms = [term for term, _ in ordered]
     steps = shrink_steps(inference, terms, generator, settings.draws)
@@ -187,7 +190,7 @@ def _with_drawn_jumps(
 
 def _findings(inference: InferenceResult) -> Iterator[str]:
     """Notes on zero offsets, biased parameters and the payload, which are found in addition to the effects."""
-    yield from zero_notes(inference.fit.estimate, inference.problem.mechanism)
+    yield from zero_notes(inference.fit.stated, inference.problem.mechanism)
     yield from bias_notes(inference)
     yield from payload_notes(inference)
     yield from undetermined_payload_notes(inference)

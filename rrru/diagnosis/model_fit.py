@@ -206,11 +206,22 @@ class EffectModel:
 
 @dataclass(frozen=True, eq=False)
 class ModelFit:
-    """An EffectModel with its Estimate; level: of the discrepancy that it was fitted with, an index."""
+    """An EffectModel with its Estimate; level: of the discrepancy that it was fitted with, an index.
+
+    bias: covariance (p, p) of the errors that a discrepancy makes in the parameters, None where the model is taken as
+    complete. Predictions at poses like those of the readings do without it: what the discrepancy adds to them it takes
+    from the parameters.
+    """
 
     model: EffectModel
     estimate: Estimate
     level: int
+    bias: FloatArray | None = None
+
+    @cached_property
+    def stated(self) -> Estimate:
+        """The Estimate whose standard errors and intervals are those of the parameters themselves."""
+        return self.estimate if self.bias is None else self.estimate.biased(self.bias)
 
     @cached_property
     def state(self) -> ModelState:
@@ -230,12 +241,12 @@ class ModelFit:
         reading depends, such as the travel of slides where only a turning drive winds up, is not fitted.
         """
         chosen, shapes = self._places_of(term)
-        return shapes, self.estimate.covariance[np.ix_(chosen, chosen)]
+        return shapes, self.stated.covariance[np.ix_(chosen, chosen)]
 
     def effect_numbers(self, term: EffectTerm) -> tuple[FloatArray, FloatArray]:
         """Values (k + q,) of a term's coefficients and its effect's fitted shape parameters, intervals (k + q, 2)."""
         chosen, _ = self._places_of(term)
-        return self.estimate.values[chosen], self.estimate.intervals[chosen]
+        return self.estimate.values[chosen], self.stated.intervals[chosen]
 
     def _places_of(self, term: EffectTerm) -> tuple[list[int], list[str]]:
         """Places of a term's coefficients and its effect's fitted shape parameters, and the names of these."""
@@ -253,7 +264,7 @@ class ModelFit:
         if WEIGHT not in places:
             return []
         (block,) = (block for block in self.estimate.parameters.blocks if block.name == WEIGHT)
-        errors = self.estimate.block_errors(WEIGHT)
+        errors = self.stated.block_errors(WEIGHT)
         return list(zip(block.names, block.units, self.estimate.block(WEIGHT).tolist(), errors.tolist(), strict=True))
 
     def one_sigma_steps(self) -> tuple[FloatArray, dict[EffectKey, FloatArray]]:

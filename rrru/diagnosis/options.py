@@ -207,6 +207,12 @@ class DiagnosisOptions:
     remainder_scales: tuple[float, ...] = (0.05, 0.1, 0.2, 0.4, 0.8)
     # inducing points of such a function; bounds the time
     remainder_points: int = 40
+    # length scales of the functions that may bias the parameters, over the range of their variable: from five waves to
+    # less than one; their sizes over that of the residuals; their inducing points are as near as a length scale and a
+    # half asks for, where the function between them is known to 2 %
+    bias_scales: tuple[float, ...] = (0.1, 0.2, 0.4, 0.8, 1.6)
+    bias_amplitudes: tuple[float, ...] = (0.3, 1.0, 3.0, 10.0)
+    bias_spacing: float = 0.5
     # it follows a variable where that predicts this share of it at left-out points: more than all others together
     min_followed_share: float = 0.5
 

@@ -1,53 +1,28 @@
 """The unexplained part of a gap: which variable it depends on, how smoothly, and how large it is.
 
-A Gaussian process of one variable at a time is fitted to the residuals of the verdict's model with its calibration. It
-is a function f of a drive's value, or of the time, that is added to the drive and moves the positions by J f (J:
-derivative by the drive). Or it is a function of the place, the time, the payload or the speed for each axis, of the
-time for each axis of the platform and one target, or steps with the sense of motion of the drives. Of each the
-calibration absorbs what it absorbs of the readings. Its covariance is a^2 exp(-d^2 / (2 l^2)) of the distance d, by its
-values at inducing points (C. Rasmussen and C. Williams, Gaussian Processes for Machine Learning, 2006, sec. 8.3); a and
-l have the highest marginal likelihood of a grid. Each fold, a fifth of all stretches of five points, is predicted from
-the others.
+A function of one variable at a time, see `rrru.diagnosis.smooth_functions`, is fitted to the residuals of the verdict's
+model with its calibration, which absorbs of it what it absorbs of the readings. Size and length scale have the highest
+marginal likelihood of a grid. Each fold, a fifth of all stretches of five points, is predicted from the others.
 """
 
 from collections.abc import Collection, Iterator
-from dataclasses import dataclass, field
 
 import numpy as np
 import pandas as pd
-from scipy.linalg import solve_triangular
-from scipy.spatial.distance import cdist
 
 from rrru.arrays import BoolArray, FloatArray, IntArray
 from rrru.cache import cached_on
-from rrru.diagnosis.discrepancy_basis import target_sites
 from rrru.diagnosis.heldout import within
 from rrru.diagnosis.inference import InferenceResult
 from rrru.diagnosis.options import OPTIONS
+from rrru.diagnosis.smooth_functions import TIME, Regression, Variable, process, variables
 from rrru.diagnosis.state import LeftByCalibration, LinearizedProblem
 from rrru.effects.protocol import Effect
-from rrru.kinematics.legs import TOOL
-from rrru.robots.drive_words import drive_words
 
 COLUMNS = ("follows", "explained", "scale", "unit", "rms_mm")
 NO_REMAINDER = pd.DataFrame(columns=COLUMNS)
 # deviations of the function over the rms of the remainder
 _AMPLITUDES = (0.3, 1.0, 3.0)
-_JITTER = 1e-8
-_TIME = "the time"
-
-
-@dataclass(frozen=True)
-class _Variable:
-    """follows: in words; value (n, d) with its unit; response (n, 3, r): of the positions to the r functions, by
-    default each axis has one; steps: the value itself is the function, at each of its columns.
-    """
-
-    follows: str
-    value: FloatArray
-    unit: str
-    response: FloatArray = field(default_factory=lambda: np.eye(3)[None])
-    steps: bool = False
 
 
 @cached_on
@@ -95,7 +70,7 @@ def followed_alike(
     variable = next(one for one in _variables(inference, on_robot) if one.follows == best["follows"])
     scaled = dict(_functions(variable))
     functions = scaled[best["scale"]] if best["scale"] in scaled else next(iter(scaled.values()))
-    design = _left(calibration, _design(variable, functions)).reshape(3 * int(on_robot.sum()), -1)
+    design = _left(calibration, variable.design(functions)).reshape(3 * int(on_robot.sum()), -1)
     found = []
     for key, coordinates in state.effects.items():
         part = _left(calibration, (linear.columns[key] @ coordinates)[on_robot]).ravel()
@@ -121,59 +96,16 @@ def _left(calibration: LeftByCalibration, values: FloatArray) -> FloatArray:
 
 def _depends_on(effect: Effect, follows: str) -> bool:
     """Whether an effect depends on the variable, in words, and on no other except those that it determines."""
-    return "time_s" in effect.needs if follows.startswith(_TIME) else not effect.needs
+    return "time_s" in effect.needs if follows.startswith(TIME) else not effect.needs
 
 
-def _variables(inference: InferenceResult, rows: BoolArray) -> list[_Variable]:
-    """The variables that may be followed at some rows (m,) of a problem, those that do not change left out."""
-    problem, drive = inference.problem, inference.evidence.linear.drive[rows]
-    motion, at = problem.motion, problem.at[rows]
-    words, units = drive_words(problem.mechanism), problem.mechanism.parts.units
-    names = words.all_names
-    found = [
-        _Variable(f"the value of {name}", motion.drive[at, k : k + 1], unit, _of_unit_size(drive[:, :, k : k + 1]))
-        for k, (name, unit) in enumerate(zip(names, units, strict=False))
-    ]
-    time_s = motion.time_s[at][:, None]
-    found += [
-        _Variable(f"{_TIME}, as a zero offset of {name}", time_s, "s", _of_unit_size(drive[:, :, k : k + 1]))
-        for k, name in enumerate(names[: len(units)])
-    ]
-    found.append(_Variable("the place", motion.position_mm[at], "mm"))
-    found.append(_Variable(_TIME, time_s, "s"))
-    found += [
-        _Variable(f"{_TIME}, as a shift of {_target(site)}", time_s, "s", response)
-        for site, response in _shifts_of_targets(inference, rows)
-    ]
-    found.append(_Variable("the payload", motion.payload_kg[at][:, None], "kg"))
-    speed = problem.points["speed_mm_s"].to_numpy(dtype=float)[rows]
-    found.append(_Variable("the speed", speed[:, None], "mm/s"))
-    sense = np.sign(np.where(np.abs(motion.drive_rate[at]) > OPTIONS.min_drive_rate, motion.drive_rate[at], 0.0))
-    found.append(_Variable("the sense of motion of the drives", sense, "1", drive, steps=True))
-    return [one for one in found if np.isfinite(one.value).all() and np.ptp(one.value, axis=0).max() > 0.0]
-
-
-def _shifts_of_targets(inference: InferenceResult, rows: BoolArray) -> Iterator[tuple[str, FloatArray]]:
-    """Sites of targets, and what their shifts along the axes of the platform make of some rows (m, 3, 3)."""
-    problem = inference.problem
-    if sites := target_sites(problem.mechanism):
-        reading = problem.map_of(inference.state)
-        for site in sites:
-            yield site, problem.of_rows(reading.effect(site))[rows][..., :3]
-
-
-def _of_unit_size(response: FloatArray) -> FloatArray:
-    """A response (m, 3, r) of an rms of one: the function has the drive's unit, its size is that of what it makes."""
-    return response / max(float(np.sqrt((response**2).mean())), 1e-300)
-
-
-def _target(site: str) -> str:
-    """The target of a site, in words."""
-    return "the target" if site == TOOL else site
+def _variables(inference: InferenceResult, rows: BoolArray) -> list[Variable]:
+    """The variables that the remainder may follow at some rows (m,)."""
+    return variables(inference.problem, inference.state, inference.evidence.linear.drive, rows)
 
 
 def _predicted(
-    variable: _Variable, left: FloatArray, fold: IntArray, noise_mm: float, calibration: LeftByCalibration
+    variable: Variable, left: FloatArray, fold: IntArray, noise_mm: float, calibration: LeftByCalibration
 ) -> tuple[FloatArray, float]:
     """What a function of a variable predicts (m, 3) of the rows left out in each fold, and its scale.
 
@@ -182,9 +114,9 @@ def _predicted(
     highest, best = -np.inf, None
     size = float(np.sqrt((left**2).mean()))
     for scale, functions in _functions(variable):
-        design = _left(calibration, _design(variable, functions))
+        design = _left(calibration, variable.design(functions))
         unit = size / max(float(np.sqrt((design**2).sum(axis=-1).mean())), 1e-300)
-        regression = _Regression(design * unit, left, noise_mm)
+        regression = Regression(design * unit, left, noise_mm)
         for amplitude in _AMPLITUDES:
             evidence = regression.log_evidence(amplitude)
             if evidence > highest:
@@ -195,65 +127,11 @@ def _predicted(
     return regression.left_out(fold, amplitude), scale
 
 
-def _design(variable: _Variable, functions: FloatArray) -> FloatArray:
-    """What functions (m, f) of a variable make of the positions (m, 3, k)."""
-    if variable.steps:
-        return variable.response * functions[:, None, :]
-    each = functions[:, None, None, :] * variable.response[..., None]
-    return each.reshape(len(functions), 3, -1)
-
-
-def _functions(variable: _Variable) -> Iterator[tuple[float, FloatArray]]:
+def _functions(variable: Variable) -> Iterator[tuple[float, FloatArray]]:
     """Pairs of a scale and functions (m, f) at the values, whose independent unit coefficients make the process."""
-    value = variable.value
     if variable.steps:
-        yield np.nan, value
+        yield np.nan, variable.value
         return
-    width = float(np.linalg.norm(np.ptp(value, axis=0)))
-    points = _inducing(value)
+    width = float(np.linalg.norm(np.ptp(variable.value, axis=0)))
     for share in OPTIONS.remainder_scales:
-        scale = share * width
-        among = np.exp(-0.5 * (cdist(points, points) / scale) ** 2)
-        across = np.exp(-0.5 * (cdist(points, value) / scale) ** 2)
-        factor = np.linalg.cholesky(among + _JITTER * np.eye(len(points)))
-        yield scale, solve_triangular(factor, across, lower=True).T
-
-
-def _inducing(value: FloatArray) -> FloatArray:
-    """Some of the values (m, d), each the one that is farthest from those before it."""
-    value = np.unique(value, axis=0)
-    count = min(OPTIONS.remainder_points, len(value))
-    chosen, distance = [0], np.linalg.norm(value - value[0], axis=1)
-    while len(chosen) < count:
-        chosen.append(int(distance.argmax()))
-        distance = np.minimum(distance, np.linalg.norm(value - value[chosen[-1]], axis=1))
-    return value[chosen]
-
-
-class _Regression:
-    """Least squares of coefficients with a normal prior: design (m, 3, f), data (m, 3), noise per number."""
-
-    def __init__(self, design: FloatArray, data: FloatArray, noise_mm: float) -> None:
-        self._design, self._data, self._variance = design, data, noise_mm**2
-        flat = design.reshape(-1, design.shape[-1])
-        self._gram, self._moment = flat.T @ flat, flat.T @ data.ravel()
-        self._value, self._turned = np.linalg.eigh(self._gram)
-        self._value = np.maximum(self._value, 0.0)
-
-    def log_evidence(self, amplitude: float) -> float:
-        """Log marginal likelihood over that of no coefficients, under their prior deviation."""
-        ratio = amplitude**2 / self._variance
-        along = self._turned.T @ self._moment
-        gained = (along**2 * ratio / (1.0 + ratio * self._value)).sum() / self._variance
-        return 0.5 * float(gained - np.log1p(ratio * self._value).sum())
-
-    def left_out(self, fold: IntArray, amplitude: float) -> FloatArray:
-        """Predictions (m, 3) of each fold by the others."""
-        result, penalty = np.empty_like(self._data), self._variance / amplitude**2 * np.eye(len(self._gram))
-        for number in np.unique(fold):
-            out = fold == number
-            design = self._design[out].reshape(-1, len(self._gram))
-            gram = self._gram - design.T @ design + penalty
-            moment = self._moment - design.T @ self._data[out].ravel()
-            result[out] = (design @ np.linalg.solve(gram, moment)).reshape(-1, 3)
-        return result
+        yield share * width, process(variable.value, share * width)

@@ -207,8 +207,8 @@ def _set_rows(inference: InferenceResult) -> pd.DataFrame:
 def parameter_rows(inference: InferenceResult) -> pd.DataFrame:
     """Rows of `gap_parameters`: all parameters of the corrected model with standard errors."""
     fit, library = inference.fit, inference.problem.effects
-    parameters, errors = inference.problem.mechanism.parameters, fit.estimate.block_errors(GEOMETRY)
-    intervals, places = fit.estimate.intervals, fit.estimate.parameters.slices
+    parameters, errors = inference.problem.mechanism.parameters, fit.stated.block_errors(GEOMETRY)
+    intervals, places = fit.stated.intervals, fit.estimate.parameters.slices
     result = [
         ("calibration", parameter.name, "", parameter.unit, value, error, *interval, held)
         for parameter, value, error, interval, held in zip(

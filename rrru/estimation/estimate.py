@@ -47,6 +47,7 @@ class Estimate:
     end: how the search ended.
     cases: of a prior that is a mixture, the posterior probability and the Estimate of each case that counts. Covariance
     and intervals are those of this mixture.
+    bias: the part of the covariance (p, p) that a discrepancy of the model makes, None where it is taken as complete.
     """
 
     problem: Problem
@@ -55,6 +56,7 @@ class Estimate:
     at_bound: BoolArray
     end: SearchEnd
     cases: tuple[tuple[float, Self], ...] = ()
+    bias: FloatArray | None = None
 
     @classmethod
     def at(cls, problem: Problem, values: FloatArray, white: FloatArray, free: BoolArray, end: SearchEnd) -> Self:
@@ -131,11 +133,12 @@ class Estimate:
         """
         if self.cases:
             return np.asarray(sum(share * one.prior_shares(priors) for share, one in self.cases))
+        complete = self.covariance if self.bias is None else self.covariance - self.bias
         precision = np.zeros(len(self.values))
         precision[priors] = self.parameters.prior_precision[priors]
         variance = np.diag(self.covariance)
         known = (variance > 0.0) & np.isfinite(variance)
-        covariance = self.covariance[np.ix_(known, known)]
+        covariance = complete[np.ix_(known, known)]
         result = np.where(np.isinf(variance), 1.0, np.nan)
         result[known] = (covariance**2 @ precision[known]) / variance[known]
         return result
@@ -172,7 +175,7 @@ class Estimate:
             off = self.parameters.mean - self.values
             step, covariance = _posterior(self.readings_triangle, self.parameters.sd, off, free)
             means[place] += step[k]
-            sds[place] = np.sqrt(covariance[k, k])
+            sds[place] = np.sqrt(covariance[k, k] + (0.0 if self.bias is None else self.bias[k, k]))
         return means, sds
 
     @cached_property
@@ -210,6 +213,11 @@ class Estimate:
     def block_errors(self, name: str) -> FloatArray:
         """Standard errors (k,) of a block of parameters; raises KeyError for an unknown name."""
         return self.standard_errors[self.parameters.slices[name]]
+
+    def biased(self, bias: FloatArray) -> Self:
+        """The Estimate whose errors have a further part of covariance (p, p), made by a discrepancy of the model."""
+        cases = tuple((share, one.biased(bias)) for share, one in self.cases)
+        return replace(self, covariance=self.covariance + bias, cases=cases, bias=bias)
 
     def scaled(self, factor: float) -> Self:
         """The Estimate under a noise that is larger by a factor, for readings that weigh far more than the prior."""

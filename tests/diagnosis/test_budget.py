@@ -7,7 +7,7 @@ import pytest
 
 from rrru.calibration.calibrate import calibrate
 from rrru.campaign import measurements as rows
-from rrru.diagnosis.budget import _noise_parts, _row
+from rrru.diagnosis.budget import _noise_parts, _numbers
 from rrru.diagnosis.settings import GapSettings
 from rrru.estimation.noise_model import NoiseModel
 from rrru.estimation.observations.target_positions import TargetPositions
@@ -67,13 +67,12 @@ def two():
 def test_the_interval_of_a_probable_cause_is_that_given_that_it_acts():
     """How probable that is has a column of its own; of an improbable one it is that of all draws."""
     draws = np.concatenate([np.zeros(100), np.random.default_rng(0).uniform(0.9, 1.0, 900)])
-    whole = np.ones(1000)
-    *_, share, low, high, _ = _row("backlash", "effect", draws, 0.9, whole, np.arange(1000) >= 100)
+    _, share, low, high = _numbers(draws, 1.0, draws, np.arange(1000) >= 100)
     assert share == pytest.approx(draws.mean()) and 0.85 < low <= share and high > 0.99
     # one that acts may have no part: signs are those of the model
-    *_, low, _, _ = _row("backlash", "effect", draws, 0.95, whole, np.arange(1000) >= 50)
+    _, _, low, _ = _numbers(draws, 1.0, draws, np.arange(1000) >= 50)
     assert low == 0.0
-    *_, low, _, _ = _row("backlash", "effect", draws, 0.4, whole)
+    _, _, low, _ = _numbers(draws, 1.0, draws)
     assert low == 0.0
 
 

@@ -7,7 +7,8 @@ import pandas as pd
 import pytest
 
 from rrru.diagnosis.options import OPTIONS
-from rrru.diagnosis.remainder import _Regression, followed_alike, remainder_rows
+from rrru.diagnosis.remainder import followed_alike, remainder_rows
+from rrru.diagnosis.smooth_functions import Regression
 from rrru.diagnosis.state import LinearizedProblem
 from rrru.robots.rrru3 import Rrru3
 
@@ -95,7 +96,7 @@ def test_left_out_predictions_are_those_of_fits_without_the_fold():
     generator = np.random.default_rng(4)
     design, data = generator.standard_normal((30, 3, 5)), generator.standard_normal((30, 3))
     fold, noise, amplitude = np.arange(30) % 3, 0.7, 1.3
-    found = _Regression(design, data, noise).left_out(fold, amplitude)
+    found = Regression(design, data, noise).left_out(fold, amplitude)
     for number in range(3):
         flat, target = design[fold != number].reshape(-1, 5), data[fold != number].ravel()
         own = np.linalg.solve(flat.T @ flat + (noise / amplitude) ** 2 * np.eye(5), flat.T @ target)
@@ -105,7 +106,7 @@ def test_left_out_predictions_are_those_of_fits_without_the_fold():
 def test_the_evidence_is_that_of_the_dense_normal_density():
     generator = np.random.default_rng(5)
     design, data = generator.standard_normal((8, 3, 4)), generator.standard_normal((8, 3))
-    problem, flat = _Regression(design, data, 0.6), design.reshape(24, 4)
+    problem, flat = Regression(design, data, 0.6), design.reshape(24, 4)
 
     def dense(amplitude):
         covariance = 0.36 * np.eye(24) + amplitude**2 * flat @ flat.T
