@@ -11,19 +11,21 @@ function of a drive's value is the same in every run.
 """
 
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import groupby, product
+from typing import Self
 
 import numpy as np
 from scipy.linalg import solve_triangular
 from scipy.special import logsumexp
 
 from rrru.arrays import FloatArray
-from rrru.diagnosis.model_fit import ModelFit
+from rrru.diagnosis.model_fit import ModelFit, whitening_of
 from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.smooth_functions import OF_DRIVES, OF_ZEROS, Regression, Variable, process, variables
 from rrru.diagnosis.state import RANK_TOLERANCE
 from rrru.estimation.estimate import Estimate
+from rrru.estimation.noise_model import Whitening
 
 # a function of which the parameters absorb all but this share leaves nothing to estimate its size from
 _LEAST_LEFT = 1e-6
@@ -34,37 +36,64 @@ _LEAST_SHARE = 1e-3
 def discrepancy_covariance(fit: ModelFit) -> FloatArray:
     """By how much the second moments (p, p) of the errors of a fit's parameters grow by a discrepancy.
 
-    It is the mean over the functions, each with a size, by their marginal likelihood. That there is none of them has
-    the prior odds of all together.
+    It is the mean over the functions, each with a size, by their marginal likelihood. That there is none of them, but
+    only the discrepancy along the runs that the fit has, has the prior odds of all together.
     """
+    left = _Left.of(fit, whitening_of(fit.model.problem, 0))
     logs, functions = list[float](), list[FloatArray]()
-    for log, made in _likely(fit):
+    for log, made in _likely(fit, left):
         logs.append(log)
         functions.append(made)
-    share = np.exp(np.array(logs) - logsumexp([*logs, np.log(max(len(logs), 1))]))
-    result: FloatArray = np.zeros((len(fit.estimate.values),) * 2)
+    along_runs = _Left.of(fit, whitening_of(fit.model.problem, fit.level)).log_evidence - left.log_evidence
+    share = np.exp(np.array(logs) - logsumexp([*logs, along_runs + np.log(max(len(logs), 1))]))
+    result = np.zeros_like(fit.estimate.covariance)
     for part, made in zip(share, functions, strict=True):
         if part > _LEAST_SHARE:
             result += part * growth_with(fit.estimate, made)
     return result
 
 
-def _likely(fit: ModelFit) -> Iterator[tuple[float, FloatArray]]:
+@dataclass(frozen=True, eq=False)
+class _Left:
+    """What a fit's parameters leave of whitened readings.
+
+    basis (3m, r): orthonormal, of the parameters' columns; residual (m, 3): beyond them; log_evidence: restricted
+    logarithm of the likelihood, up to a constant of the readings and parameters.
+    """
+
+    whiten: Whitening
+    basis: FloatArray
+    residual: FloatArray
+    log_evidence: float
+
+    @classmethod
+    def of(cls, fit: ModelFit, whiten: Whitening) -> Self:
+        """What a fit leaves under a Whitening."""
+        jacobian, residual = fit.estimate.jacobian, whiten(fit.estimate.residual)
+        unit = _inverse_lengths(jacobian.reshape(-1, jacobian.shape[-1]))
+        columns = whiten(jacobian * unit).reshape(residual.size, -1)
+        turned, values, _ = np.linalg.svd(columns, full_matrices=False)
+        seen = values > RANK_TOLERANCE * values.max(initial=0.0)
+        basis = turned[:, seen]
+        left = residual.ravel() - basis @ (basis.T @ residual.ravel())
+        log = whiten.log_determinant - float(np.log(values[seen]).sum()) - 0.5 * float(left @ left)
+        return cls(whiten, basis, left.reshape(residual.shape), log)
+
+    def of_functions(self, design: FloatArray) -> FloatArray:
+        """What is left of functions (m, 3, k) of unit size, whitened."""
+        white = self.whiten(design).reshape(self.residual.size, -1)
+        return np.asarray(white - self.basis @ (self.basis.T @ white)).reshape(design.shape)
+
+
+def _likely(fit: ModelFit, left: _Left) -> Iterator[tuple[float, FloatArray]]:
     """Log marginal likelihood of functions of each size over none, and what they make of the readings (m, 3, k)."""
-    estimate, problem = fit.estimate, fit.model.problem
-    columns = estimate.jacobian.reshape(estimate.residual.size, -1)
-    turned, values, _ = np.linalg.svd(columns * _inverse_lengths(columns), full_matrices=False)
-    basis = turned[:, values > RANK_TOLERANCE * values.max(initial=0.0)]
-    residual = estimate.residual.ravel()
-    left = (residual - basis @ (basis.T @ residual)).reshape(estimate.residual.shape)
-    rms = float(np.sqrt((left**2).mean()))
+    rms = float(np.sqrt((left.residual**2).mean()))
     for design in _designs(fit):
-        flat = design.reshape(left.size, -1)
-        rest = flat - basis @ (basis.T @ flat)
-        whole, seen = (float(np.sqrt((part**2).sum(axis=1).mean())) for part in (flat, rest))
+        rest = left.of_functions(design)
+        whole, seen = (float(np.sqrt((one**2).sum(axis=-1).mean())) for one in (left.whiten(design), rest))
         if seen <= _LEAST_LEFT * whole:
             continue
-        regression = Regression(rest.reshape(design.shape) * (rms / seen), left, problem.noise_mm)
+        regression = Regression(rest * (rms / seen), left.residual, 1.0)
         for amplitude in OPTIONS.bias_amplitudes:
             yield regression.log_evidence(amplitude), design * (amplitude * rms / seen)
 
