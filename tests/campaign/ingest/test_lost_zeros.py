@@ -186,7 +186,7 @@ def test_a_zero_without_which_a_stop_has_no_pose_is_not_small():
     zeros = np.array([1e-4, 0.0, 0.15])
     drive = robot.inverse(position) - zeros
     assert robot.solve(drive + zeros, position).closed.all()
-    assert robot.solve(drive + [1e-4, 0.0, 0.0], position).closed.tolist() == [True, False]
+    assert robot.solve(drive + zeros * [1.0, 0.0, 0.0], position).closed.tolist() == [True, False]
 
     def frames(poses):
         assert np.isfinite(poses.position_mm).all()

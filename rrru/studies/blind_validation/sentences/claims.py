@@ -61,8 +61,8 @@ _SENTENCES = {
     "causes by share": r"Causes by their share of the gap: (?P<listed>.*)\.",
     "a group of causes": r"One of these acts, and these data cannot tell which: (?P<listed>.*) "
     rf"\(probability that one does: {_P}\).*",
-    "probability of this answer": rf"(?:Probability that it acts: (?P<each>.*)\. )?Probability of (?:exactly )?this "
-    rf"answer(?:, alone or with further causes)?: {_P}\.",
+    "probability of this answer": rf"(?:Probability that it acts: (?P<each>.*)\. )?Probability of (?:exactly )?"
+    rf"(?:this answer|the causes of the corrected model)(?:, alone or with further causes)?: {_P}\.",
     "it does not repeat": rf"(?:{_SHARE}|An undetermined share|Some of it) does not repeat from pass to pass.*",
     "it is random error": rf"(?:{_SHARE}|An undetermined share|Some of it) is random error above the stated noise.*",
     "it looks random and is correlated": rf"(?:{_SHARE}|An undetermined share|Some of it) looks like random error, "
