@@ -492,3 +492,7 @@ def test_no_line_of_the_page_names_one_of_a_group_for_all_of_it(effects):
     assert not any("this answer:" in text for text in said)
     kinds = {claim.kind for text in said for claim in claims._of_text(text, claims._SENTENCES)}
     assert {"a group of causes", "probability of this answer"} <= kinds and claims.UNKNOWN not in kinds
+    # a group is no name
+    judged = {claim.kind: claim for claim in claims._of_facts(facts)}
+    assert judged["names in the verdict"].stated["names"] == ([] if alone else ["backlash"])
+    assert judged["verdict"].text.startswith("link_flexure_or_drive_compliance")
