@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from scipy.special import chdtri
 
 from rrru.arrays import FloatArray
 from rrru.campaign import noise
@@ -380,9 +381,16 @@ class _Linearization:
         self._source: str | None = None
 
     def at(
-        self, problem: DiagnosisProblem, state: ModelState, terms: Sequence[EffectTerm] = ()
+        self,
+        problem: DiagnosisProblem,
+        state: ModelState,
+        terms: Sequence[EffectTerm] = (),
+        noise_again: bool = False,
     ) -> tuple[DiagnosisProblem, LinearizedProblem, str]:
-        """Problem with harmonics and noise, its linearisation at a state with hypothesis terms, source of the noise."""
+        """Problem with harmonics and noise, its linearisation at a state with hypothesis terms, source of the noise.
+
+        noise_again: whether the noise that was found about another state does not hold at this one.
+        """
         linear = problem.linearise(state)
         problem, orders = with_orders(problem, linear, terms)
         problem, waves = with_spectra(problem, linear, terms)
@@ -392,8 +400,9 @@ class _Linearization:
             linear = replace(linear, columns=columns_of | problem.linearise(state, [*orders, *waves]).columns)
         if self._stated == KNOWN:
             return problem, linear, "given"
-        # many columns take long to be projected out, and leave the same residuals at every state
-        if self._source and any(effect.coordinates.broad for effect in problem.library.values()):
+        # many columns take long to be projected out, and leave the same residuals at every state of a linear model
+        broad = any(effect.coordinates.broad for effect in problem.library.values())
+        if self._source and broad and not noise_again:
             return problem, linear, self._source
         with_found, source = with_noise(problem, linear, self._stated_mm if self._stated == STATED else None)
         self._source = source
@@ -406,6 +415,18 @@ def _is_nonlinear(problem: DiagnosisProblem, linear: LinearizedProblem, state: M
     predicted = predicted - sum(linear.columns[key] @ numbers for key, numbers in fitted.effects.items())
     difference = np.sqrt(((problem.residual(fitted) - predicted) ** 2).mean())
     return bool(difference > OPTIONS.max_nonlinearity_per_noise * problem.noise_mm)
+
+
+def _leaves_less_than_noise(problem: DiagnosisProblem, fit: ModelFit) -> bool:
+    """Whether a fit leaves less than the noise does by chance: what a linearisation lacked was taken for noise.
+
+    As where stops move drives by less than their backlash: no column of the library about a robot without backlash is
+    like that.
+    """
+    residual = problem.residual(fit.state)
+    freedom = residual.size - len(fit.estimate.parameters)
+    least = chdtri(freedom, 1.0 - OPTIONS.max_noise_again_p) if freedom > 0 else 0.0
+    return bool((residual**2).sum() < least * problem.noise_mm**2)
 
 
 def _rounds(problem: DiagnosisProblem, calibrated: ModelState, prior: Prior, stated: str) -> InferenceResult:
@@ -449,7 +470,7 @@ def _rounds(problem: DiagnosisProblem, calibrated: ModelState, prior: Prior, sta
             break
         try:
             moved = problem.standing(found.state).with_approach(found.state)
-            linearized = linearization.at(moved, found.state, tried.terms)
+            linearized = linearization.at(moved, found.state, tried.terms, _leaves_less_than_noise(moved, found))
         except FitError:
             # the fitted model has no pose at a reading: the last linearisation is used
             break

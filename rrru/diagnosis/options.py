@@ -60,6 +60,8 @@ class DiagnosisOptions:
     min_free_share: float = 0.1
     # probability that noise alone adds an order of a search to the columns that the noise is estimated after; assumed
     max_searched_order_p: float = 0.01
+    # probability of smaller residuals by chance below which the noise is found again after a fit; assumed
+    max_noise_again_p: float = 0.01
     # rounds of leaving out outliers; assumed
     max_outlier_rounds: int = 3
     # rounds of search and fit until the best hypothesis stays; assumed

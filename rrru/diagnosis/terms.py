@@ -68,15 +68,13 @@ def variants(effect: TestedEffect) -> tuple[EffectTerm, ...]:
     """All terms of an effect: each shape with each choice of legs that makes a difference.
 
     One value for all legs is tried for coordinates that cannot be negative: sizes of one design, unlike the signed
-    errors of an assembly, and unlike the joints of an arm.
+    errors of an assembly, and unlike the joints of an arm. An effect of a single leg acts on that one.
     """
-    coordinates, legs = effect.coordinates, per_leg(effect)
-    choices = (
-        EACH,
-        *((SAME,) if legs_alike(effect) and coordinates.alike and coordinates.positive.all() else ()),
-        *(np.unique(coordinates.legs).tolist() if legs else ()),
-    )
-    return tuple(EffectTerm(effect.name, shape, legs) for shape in range(len(coordinates.shapes)) for legs in choices)
+    coordinates = effect.coordinates
+    legs: list[OnLegs] = np.unique(coordinates.legs).tolist() if per_leg(effect) else []
+    same = legs_alike(effect) and coordinates.alike and coordinates.positive.all()
+    choices = legs if len(legs) == 1 else [EACH, *([SAME] if same else []), *legs]
+    return tuple(EffectTerm(effect.name, shape, one) for shape in range(len(coordinates.shapes)) for one in choices)
 
 
 def may_be_on_some(effect: TestedEffect) -> bool:

@@ -25,6 +25,7 @@ _NOISE = ("noise_stated_mm", "noise_correlation", "noise_runs_mm", "noise_from")
 _PART = ("part", "kind", "rms_mm", "share", "share_low", "share_high", "probability")
 _WORST = ("name", "unit", "drive_value", "error", "low_95", "high_95")
 _NUMBER = ("parameter", "place", "unit", "value", "standard_error", "low_95", "high_95", "at_bound")
+_ADVICE = ("inspect", "remedy", "source")
 _FOLLOWS = ("follows", "explained", "scale", "unit", "rms_mm")
 _RUN = ("run", "kind", "trajectory", "reverse", "speed_mm_s", "payload_kg", "points", "separates", "gain_nats")
 _APART = ("none", "unexplained")
@@ -52,7 +53,9 @@ def answer(
         "leg": verdict["leg"] or None,
         "where": verdict["where"],
         "confounded_with": [name for name in verdict["confounded_with"].split(", ") if name],
-        "groups": [_group(names.split(" | "), tables, budget) for names in verdict["groups"].split("; ") if names],
+        "groups": [
+            _group(names.split(" | "), tables, budget, drives) for names in verdict["groups"].split("; ") if names
+        ],
         "searches_apart": verdict["searches_apart"],
         **_row(verdict, _VERDICT + _NOISE),
         "unexplained_follows": [_row(row, _FOLLOWS) for row in tables["gap_remainder"].to_dict("records")],
@@ -119,7 +122,7 @@ def _effect(
     cause = tables["gap_attribute"].set_index("effect").loc[name]
     legs = cause["legs"] if isinstance(cause["legs"], str) else ""
     numbers = tables["gap_parameters"].query("effect == @name").to_dict("records")
-    leg = (int(legs),) if legs.isdigit() else ()
+    leg = _leg(legs)
     places = tables["gap_drive_functions"].query("effect == @name and worst")
     # of an effect of one leg its largest error is that of its drive
     places = places[places["drive"].isin(leg or places["drive"])]
@@ -142,18 +145,27 @@ def _places(numbers: Sequence[Facts]) -> str:
     return f"{places[0][0]} {', '.join(name for _, _, name in places)}" if places else ""
 
 
-def _group(names: list[str], tables: Mapping[str, pd.DataFrame], budget: Sequence[Facts]) -> dict[str, Any]:
+def _group(
+    names: list[str], tables: Mapping[str, pd.DataFrame], budget: Sequence[Facts], drives: DriveWords
+) -> dict[str, Any]:
     """Facts of a group of confounded causes."""
     causes = tables["gap_attribute"].set_index("effect").loc[names]
     # they exclude each other, or nearly so
     parts = [part for part in budget if part["kind"] == "effect" and part["part"] in names]
+    texts = [cause_texts(name, drives, _leg(legs)) for name, legs in zip(names, causes["legs"], strict=True)]
     return {
         "names": names,
+        "causes": [{"name": name} | _row(vars(text), _ADVICE) for name, text in zip(names, texts, strict=True)],
         "probabilities": [_clipped(float(one)) for one in causes["probability"]],
         "probability": _clipped(float(causes["group_probability"].iloc[0])),
         "rms_mm": float(np.linalg.norm([part["rms_mm"] for part in parts])),
         "share": sum(part["share"] for part in parts),
     }
+
+
+def _leg(legs: object) -> tuple[int, ...]:
+    """The one leg of an effect's legs as a table has them, none for several."""
+    return (int(legs),) if isinstance(legs, str) and legs.isdigit() else ()
 
 
 def _not_tested(causes: pd.DataFrame) -> list[dict[str, str]]:

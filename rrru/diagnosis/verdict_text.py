@@ -70,6 +70,22 @@ def sentences(facts: Facts) -> list[str]:
     return [*said, *_open(facts), *_next(facts)]
 
 
+def causes_in_words(facts: Facts) -> list[tuple[str, Facts]]:
+    """Each cause of the answer in words, with its share and size: an effect, or a group as "one or another"."""
+    groups = {group["names"][0]: group for group in facts["groups"]}
+    parts = [groups.get(effect["name"], effect) for effect in facts["effects"]]
+    return [(" or ".join(map(readable, part.get("names") or [part["name"]])), part) for part in parts]
+
+
+def sure_in_words(facts: Facts) -> str:
+    """The probability of the answer in words: of a group alone that one of it acts, else of exactly its causes."""
+    firsts = [readable(group["names"][0]) for group in facts["groups"]]
+    if firsts and len(facts["effects"]) == 1 and not facts["unexplained"]:
+        return f"probability {probability(facts['groups'][0]['probability'])}"
+    of = f", of exactly this answer with {' and '.join(firsts)}," if firsts else ""
+    return f"probability{of} {probability(facts['probability'])}"
+
+
 def _no_answer(facts: Facts) -> str:
     """Why nothing is said of causes."""
     return f"No cause is named: {facts['no_answer']}."
@@ -206,12 +222,13 @@ def _sure(facts: Facts, groups: Mapping[str, Facts]) -> list[str]:
     """How probable each cause is, and the answer as a whole."""
     single = [effect for effect in facts["effects"] if effect["name"] not in groups]
     sure = probability(facts["probability"])
-    if not single:
-        return [f"Probability of this answer: {sure}."]
-    # `rrru.diagnosis.verdict.decide` counts sets of more causes, too, where something is unexplained
-    answer = "this answer, alone or with further causes" if facts["unexplained"] else "exactly this answer"
+    # `rrru.diagnosis.verdict.decide` counts sets of more causes, too, where something is unexplained, and of a group
+    # those with its first cause
+    answer = "the causes of the corrected model" if groups else "this answer"
+    answer = f"{answer}, alone or with further causes" if facts["unexplained"] else f"exactly {answer}"
     listed = ", ".join(f"{readable(one['name'])} {probability(one['probability'])}" for one in single)
-    return [f"Probability that it acts: {listed}. Probability of {answer}: {sure}."]
+    each = f"Probability that it acts: {listed}. " if single else ""
+    return [f"{each}Probability of {answer}: {sure}."]
 
 
 def _shares_are_determined(facts: Facts) -> bool:

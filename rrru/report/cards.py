@@ -4,8 +4,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
-from rrru.diagnosis.number_text import is_determined, percent, probability, readable, rounded, share_with_interval
+from rrru.diagnosis.number_text import is_determined, percent, readable, rounded, share_with_interval
 from rrru.diagnosis.verdict_facts import not_corrected
+from rrru.diagnosis.verdict_text import causes_in_words, sure_in_words
 from rrru.report import worth
 from rrru.report.worth import Worth
 
@@ -103,7 +104,7 @@ def card(
         rounded(facts["noise_rms_mm"]),
         lead,
         others,
-        _advice(facts["effects"]),
+        _advice(facts),
         following,
         facts["notes"],
         [] if not_corrected(facts) else list(models),
@@ -116,7 +117,7 @@ def card(
 
 def _short(facts: Facts) -> str:
     """The answer in a line: causes with their shares, the probability, and the next run."""
-    named = [(readable(effect["name"]), _known_share(effect)) for effect in facts["effects"]]
+    named = [(words, _known_share(part)) for words, part in causes_in_words(facts)]
     if facts["no_answer"]:
         return f"No cause is named: {facts['no_answer']}."
     if facts["unexplained"]:
@@ -125,23 +126,28 @@ def _short(facts: Facts) -> str:
     named.sort(key=lambda one: -(one[1] or 0.0))
     causes = ", ".join(words if share is None else f"{words} {percent(share)}" for words, share in named)
     following = f" Next: {facts['next'][0]['run']}." if facts["next"] else ""
-    return f"{causes.capitalize() or 'Nothing to add'} (probability {probability(facts['probability'])}).{following}"
+    return f"{causes.capitalize() or 'Nothing to add'} ({sure_in_words(facts)}).{following}"
 
 
 def _known_share(part: Facts) -> float | None:
-    """The share of an effect or of a part of the budget, None where there is none or its interval says nothing."""
-    return part["share"] if part["share"] is not None and is_determined(part) else None
+    """The share of an effect, a group or a part of the budget, None where there is none or its interval says nothing.
+
+    Groups have no interval.
+    """
+    known = part["share"] is not None and ("share_low" not in part or is_determined(part))
+    return part["share"] if known else None
 
 
-def _advice(effects: Sequence[Facts]) -> list[Advice]:
-    """Advice on the named causes that are the library's."""
-    return [
-        Advice(
-            f"{readable(one['name']).capitalize()} {one['place']}".strip(), one["inspect"], one["remedy"], one["source"]
-        )
-        for one in effects
-        if one["inspect"]
-    ]
+def _advice(facts: Facts) -> list[Advice]:
+    """Advice on the named causes that are the library's, and on each cause of a group."""
+    result = []
+    for _, part in causes_in_words(facts):
+        alone = "names" not in part
+        for one in [part] if alone else part["causes"]:
+            words = readable(one["name"]).capitalize()
+            cause = f"{words} {one['place']}".strip() if alone else f"{words}, if it acts"
+            result.append(Advice(cause, one["inspect"], one["remedy"], one["source"]))
+    return [one for one in result if one.inspect]
 
 
 def _file_worth(facts: Facts, registered: bool) -> list[str]:

@@ -10,7 +10,8 @@ from typing import TypeAlias
 
 import pandas as pd
 
-from rrru.diagnosis.number_text import probability, readable, rounded
+from rrru.diagnosis.number_text import readable, rounded
+from rrru.diagnosis.verdict_text import causes_in_words, sure_in_words
 from rrru.errors import ConfigError
 from rrru.report import cells, compare, page
 from rrru.report.compare import Difference, GapDifference, Side, gap_difference
@@ -116,14 +117,14 @@ def _gap(one: Side, other: Side, gap: GapDifference) -> Iterator[str]:
     """Residual error of each side, and whether it differs."""
     for side in (one, other):
         facts = side.verdict
-        names = [effect["name"] for effect in facts["effects"]] + ["unexplained"] * facts["unexplained"]
+        names = [words for words, _ in causes_in_words(facts)] + ["unexplained"] * facts["unexplained"]
         gap_mm = rounded(facts["gap_rms_mm"])
         if why := facts.get("no_answer"):
             yield f"{side.name} has a residual error of {gap_mm} mm after calibration, and no cause is named: {why}."
             continue
-        causes = readable("+".join(names)) or "nothing to add"
-        sure = probability(facts["probability"])
-        yield f"{side.name} has a residual error of {gap_mm} mm after calibration: {causes} (probability {sure})."
+        causes = " + ".join(names) or "nothing to add"
+        sure = sure_in_words(facts)
+        yield f"{side.name} has a residual error of {gap_mm} mm after calibration: {causes} ({sure})."
     differs = list(gap.rows.loc[gap.rows["differs"], "part"])
     said = "differ" if gap.chance < _LEVEL else "do not differ beyond chance"
     parts = f" Parts that differ: {', '.join(map(readable, differs))}." if differs else ""

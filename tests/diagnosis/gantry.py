@@ -96,10 +96,24 @@ def campaign(backlash_mm=(0.0, 0.0, 0.0), grown=lambda way, time: 0.0, seed=1):
     return pd.concat(tables, ignore_index=True).assign(speed_mm_s=np.nan, payload_kg=np.nan, status="ok")
 
 
-def stops(erring, count=70, seed=1):
-    """A table of so many stops at random; erring: from values (n, 3) of the slides to those where they stand."""
+def with_backlash(width_mm):
+    """Where slides stand that are driven to values (n, 3) in order and have backlash (3,)."""
+
+    def erring(way):
+        backlash = _Backlash(width_mm, way[0])
+        return np.array([backlash.driven(one[None]) for one in way])
+
+    return erring
+
+
+def stops(erring, count=70, seed=1, share=0.9):
+    """A table of so many stops at random; erring: from values (n, 3) of the slides to those where they stand.
+
+    share: of the ranges, about their middle, in which the stops are.
+    """
     generator = np.random.default_rng(seed)
-    way = RANGES_MM[:, 0] + np.ptp(RANGES_MM, axis=1) * generator.uniform(0.05, 0.95, (count, 3))
+    middle = 0.5 * (1.0 + share * generator.uniform(-1.0, 1.0, (count, 3)))
+    way = RANGES_MM[:, 0] + np.ptp(RANGES_MM, axis=1) * middle
     seen = erring(way) @ _AXES + NOISE_MM * generator.standard_normal((count, 3))
     numbers = {"trajectory": "stops", "run": 1, "point": np.arange(1, count + 1), "time_s": np.nan}
     drives = dict(zip(GANTRY.parts.columns, way.T, strict=True))

@@ -6,7 +6,7 @@ import pytest
 from rrru.diagnosis.diagnose import MeasuredRobot, diagnose
 from rrru.diagnosis.settings import GapSettings
 from rrru.kinematics.dynamics import Masses
-from tests.diagnosis.gantry import GANTRY, NOISE_MM, campaign, stops
+from tests.diagnosis.gantry import GANTRY, NOISE_MM, campaign, stops, with_backlash
 
 # of the waves of an error function with steps, see `rrru.effects.drive_error_function`
 _FINEST_ORDER = 128
@@ -65,6 +65,16 @@ def test_rivals_that_need_times_are_separated_by_poses_that_have_times():
     way = np.linalg.norm(frame[[f"command_{axis}_mm" for axis in "xyz"]].diff(), axis=1)[same]
     expected = np.median(way / frame["time_s"].diff().to_numpy()[same])
     np.testing.assert_allclose(listed["speed_mm_s"], expected)
+
+
+def test_backlash_is_no_noise_where_stops_move_slides_by_less_than_it():
+    """The columns of a gantry without backlash hold no such stops. The noise of their fit, three times, was kept."""
+    width_mm = np.array([0.5, 0.3, 0.4])
+    found, numbers, errors = _diagnosed(stops(with_backlash(width_mm), count=150, share=0.02))
+    assert found.verdict["effects"] == "backlash"
+    assert found.verdict["noise_rms_mm"] == pytest.approx(np.sqrt(3.0) * NOISE_MM, rel=0.1)
+    assert all(_off(numbers, errors, f"width{k}", true) < 3.0 for k, true in enumerate(width_mm, 1))
+    assert all(errors[f"width{k}"] < 0.002 for k in (1, 2, 3))
 
 
 @pytest.mark.parametrize("size_mm", [0.1, 0.2])

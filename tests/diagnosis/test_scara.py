@@ -5,6 +5,7 @@ import pytest
 
 from rrru.diagnosis.diagnose import MeasuredRobot, diagnose
 from rrru.diagnosis.settings import GapSettings
+from rrru.diagnosis.terms import variants
 from rrru.effects.library import find
 from rrru.kinematics.dynamics import Masses
 from rrru.pipeline import setup
@@ -78,3 +79,10 @@ def test_the_travel_of_slides_is_no_number_of_a_turning_drive_s_wind_up():
     numbers = found.tables["gap_parameters"].query("effect == 'friction_windup'").set_index("parameter")
     assert numbers["low_95"]["travel_rad"] < 0.05 < numbers["high_95"]["travel_rad"]
     assert np.isnan(numbers.loc["travel_mm", ["standard_error", "low_95", "high_95"]].to_numpy(dtype=float)).all()
+
+
+def test_an_effect_of_the_only_slide_acts_at_that_slide():
+    """At "each" of one slide is the same: the answer named no drive where both were equally probable."""
+    library = GapSettings().library(make_mechanism("scara", _SCARA, parameter_set="full"))
+    assert {term.legs for term in variants(library["lead_error"])} == {3}
+    assert {term.legs for term in variants(library["gain_error"])} == {"each", 1, 2}

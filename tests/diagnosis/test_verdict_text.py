@@ -465,3 +465,34 @@ def test_numbers_of_numpy_and_what_is_not_finite_are_plain_in_a_file(tmp_path):
         {"a": np.float64(2.5), "b": np.nan, "c": (np.int64(3), np.bool_(True)), "d": {"e": -np.inf}}, tmp_path / "f"
     )
     assert json.loads((tmp_path / "f").read_text()) == {"a": 2.5, "b": None, "c": [3, True], "d": {"e": None}}
+
+
+@pytest.mark.parametrize("effects", ["link_flexure", "link_flexure+backlash"])
+def test_no_line_of_the_page_names_one_of_a_group_for_all_of_it(effects):
+    """The line of the overview had the most probable cause, with the probability that it acts alone."""
+    causes = synthetic_gap.gap_attribute(
+        CAMPAIGN, likely=(("link_flexure", 0.6, "2"), ("drive_compliance", 0.35, "each"), ("backlash", 0.97, "each"))
+    )
+    grouped = causes["effect"].isin(["link_flexure", "drive_compliance"])
+    causes.loc[grouped, ["decision", "group_probability"]] = "group", 0.94
+    facts = answered(causes=causes, effects=effects, groups="link_flexure | drive_compliance", probability=0.55, leg=0)
+    jsonschema.validate(json.loads(json.dumps(facts)), SCHEMA)
+    own = card(facts)
+    alone = effects == "link_flexure"
+    assert own.short.startswith("Link flexure or drive compliance 60 %")
+    sure = "probability 0.94" if alone else "probability, of exactly this answer with link flexure, 0.55"
+    assert f"({sure})" in own.short
+    advised = {one.cause: one.inspect for one in own.advice}
+    for name, legs in (("link_flexure", (2,)), ("drive_compliance", ())):
+        words = name.replace("_", " ").capitalize()
+        assert advised[f"{words}, if it acts"] == cause_texts(name, _LEGS, legs).inspect
+    assert len(advised) == (2 if alone else 3)
+    said = facts["sentences"]
+    assert any(text.endswith("Probability of exactly the causes of the corrected model: 0.55.") for text in said)
+    assert not any("this answer:" in text for text in said)
+    kinds = {claim.kind for text in said for claim in claims._of_text(text, claims._SENTENCES)}
+    assert {"a group of causes", "probability of this answer"} <= kinds and claims.UNKNOWN not in kinds
+    # a group is no name
+    judged = {claim.kind: claim for claim in claims._of_facts(facts)}
+    assert judged["names in the verdict"].stated["names"] == ([] if alone else ["backlash"])
+    assert judged["verdict"].text.startswith("link_flexure_or_drive_compliance")

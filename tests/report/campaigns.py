@@ -23,8 +23,8 @@ def measured(seed, errors=ERRORS, noise_mm=NOISE_MM, passes=(FORWARD, REVERSE)):
     return VirtualRobot(deviations=errors).run(plan_of(passes), noise_mm, np.random.default_rng(seed))[0]
 
 
-def leave(folder, campaign, frame, noise_mm=NOISE_MM, nominal=NOMINAL, sets=SETS):
-    """Write a campaign's measurements, calibrations and answer to a folder of results."""
+def leave(folder, campaign, frame, noise_mm=NOISE_MM, nominal=NOMINAL, sets=SETS, groups=()):
+    """Write a campaign's measurements, calibrations and answer, with these groups, to a folder of results."""
     place, robot = folder / "campaigns" / campaign, Rrru3()
     settings = campaign_fit.CalibrationSettings.from_config(sets)
     fits = campaign_fit.fit_sets(frame, robot, settings, noise_mm)
@@ -43,6 +43,7 @@ def leave(folder, campaign, frame, noise_mm=NOISE_MM, nominal=NOMINAL, sets=SETS
     )
     part = {"part": "backlash", "kind": "effect", "rms_mm": 0.01, "share": 1.0, "share_low": 0.8, "share_high": 1.2}
     answer = {"effects": [{"name": "backlash"}], "unexplained": False, "probability": 0.9, "gap_rms_mm": 0.01}
+    answer |= {"groups": [*groups]}
     json_files.write(answer | {"budget": [part], "noise_rms_mm": noise_mm * 3.0**0.5}, place / "verdict.json")
 
 

@@ -175,3 +175,14 @@ def test_the_command_ends_with_a_message(folder, tmp_path, capsys):
     assert "error: compare: A and B are both" in capsys.readouterr().err
     assert cli.main(["compare", f"{folder}:a", f"{folder}:b", *page]) == cli.DONE
     assert capsys.readouterr().out.strip() == f"page: {tmp_path / 'page.html'}"
+
+
+def test_a_group_is_named_as_one_with_the_probability_that_one_of_it_acts(tmp_path):
+    """The most probable cause was named for all of it, with the probability that it acts alone."""
+    group = {"names": ["backlash", "friction_windup"], "probabilities": [0.55, 0.43], "probability": 0.98}
+    for name, groups in (("a", [group]), ("b", [])):
+        leave(tmp_path, name, measured(7), groups=groups)
+    compare_page.write(f"{tmp_path}:a", f"{tmp_path}:b", tmp_path / "page.html")
+    text = (tmp_path / "page.html").read_text()
+    assert "after calibration: backlash or friction windup (probability 0.98)." in text
+    assert "after calibration: backlash (probability 0.90)." in text

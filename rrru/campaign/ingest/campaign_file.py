@@ -33,6 +33,7 @@ from rrru.campaign.ingest.spec import MM, IngestSpec
 from rrru.campaign.ingest.target_placement import TargetPlacement, check_turned, places_instead, target_placement
 from rrru.campaign.measurements import command, measured, turn_columns, turns, vector_columns
 from rrru.errors import ConfigError, FitError, GrossFileError, MistakeError
+from rrru.kinematics.readings import Readings
 from rrru.kinematics.robot import Robot
 
 # names of columns of drive values, which end in an angle's unit
@@ -238,6 +239,18 @@ def _jacobian(sheet: Sheet) -> np.ndarray:
     return sheet.mechanism.parameter_jacobian(position, sheet.actuators(position))
 
 
+def _turn_jacobian(sheet: Sheet, length_mm: float) -> np.ndarray:
+    """The same of the commanded orientations, an angle as the way in mm of a point at a length."""
+    position, robot = command(sheet.frame), sheet.mechanism
+    actuators = sheet.actuators(position)
+    poses = robot.solve(actuators, position)
+    readings = Readings(position, turn=poses.turn, characteristic_length_mm=length_mm)
+    columns = np.full((len(position), 3, robot.directions.shape[-1]), np.nan)
+    known = np.isfinite(poses.turn).all(axis=(1, 2))
+    columns[known] = robot.map(actuators, poses, readings=readings).columns(robot.directions)[len(position) :]
+    return columns
+
+
 def _off_as_mirrored(seen: np.ndarray, target: np.ndarray) -> float:
     """Residual in mm rms of measured positions (n, 3) that fit far better with one axis reversed, else 0."""
     try:
@@ -303,7 +316,8 @@ def _table(
         computed |= sheet.spec.motion.columns()
     frame = sheet.frame.assign(**computed)
     if turned:
-        outlier |= turned_outliers(frame, sheet.mechanism.characteristic_length_mm)
+        length_mm = sheet.mechanism.characteristic_length_mm
+        outlier |= turned_outliers(frame, length_mm, partial(_turn_jacobian, sheet, length_mm))
     frame = frame.assign(status=np.where(outlier, "outlier", "ok"))
     if outlier.any():
         count = int(outlier.sum())

@@ -124,12 +124,12 @@ def resolve(
             unit = f" and angle_unit: {angle_unit}" if angle_unit and angle_unit != spec.angle_unit else ""
             value, allowed = "columns that look like the drives' values", f"columns: {{{pairs}}}{unit}"
             problems.add("drives", column=", ".join(spare.values()), value=value, allowed=allowed)
-        for name in dict.fromkeys(extra):
-            if meant.get(name) in spare or name in alone:
-                continue
+        undeclared = [name for name in dict.fromkeys(extra) if not (meant.get(name) in spare or name in alone)]
+        for name in undeclared:
             shown = name or f"(no name, column {names.index(name) + 1}; pandas writes its index so)"
             advice = _advice(_nearest(name, unused), name)
-            allowed = f"extra_columns: ignore, which leaves it out{advice}; known: {', '.join(wanted)}"
+            known = f"; known: {', '.join(wanted)}" if name == undeclared[0] else ""
+            allowed = f"extra_columns: ignore, which leaves it out{advice}{known}"
             problems.add("unknown column", column=shown, value="an undeclared column", allowed=allowed)
     return found, extra
 

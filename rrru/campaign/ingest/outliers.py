@@ -63,17 +63,18 @@ def outliers(frame: pd.DataFrame, digit_mm: float, jacobian: Callable[[], np.nda
     return _spoilt(measured(frame) - command(frame), frame, digit_mm, jacobian)
 
 
-def turned_outliers(frame: pd.DataFrame, length_mm: float) -> np.ndarray:
+def turned_outliers(frame: pd.DataFrame, length_mm: float, jacobian: Callable[[], np.ndarray]) -> np.ndarray:
     """Rows (n,) whose orientation was taken wrong, as a camera does that sees a marker from the front.
 
     frame: with orientations, commanded and measured, in the robot's frame; length_mm: at which an angle counts as the
-    way of a point there. The deviations of orientations are then judged as those of positions are.
+    way of a point there; jacobian: makes the derivative (n, 3, p) of these ways by the geometry. The deviations of
+    orientations are then judged as those of positions are.
     """
     off = np.full((len(frame), 3), np.nan)
     seen, commanded = turns(frame, "measured"), turns(frame, "command")
     known = np.isfinite(seen + commanded).all(axis=(1, 2))
     off[known] = Rotation.from_matrix(seen[known] @ commanded[known].transpose(0, 2, 1)).as_rotvec()
-    return _spoilt(length_mm * off, frame, 0.0, lambda: np.zeros((len(frame), 3, 0)))
+    return _spoilt(length_mm * off, frame, 0.0, jacobian)
 
 
 def _spoilt(

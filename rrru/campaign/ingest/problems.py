@@ -50,7 +50,7 @@ class Problems:
             listed += problems[:LISTED]
             if len(problems) > LISTED:
                 more = f"{len(problems)} problems of this kind, of which the first {LISTED} are listed"
-                listed.append(problems[0] | {"row": None, "column": None, "value": more})
+                listed.append(problems[LISTED] | {"row": None, "column": None, "value": more})
         return listed
 
     def refuse_now(

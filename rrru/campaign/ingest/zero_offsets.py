@@ -80,12 +80,16 @@ def _far_off(robot: Robot, driven: _Driven, frames: Callable[[Poses], "Framed"],
     """Sizes (K,) of zero offsets (K,) over LOST, 0 for those that move what is read by less than LARGE in mm.
 
     As much may be an error of tool or links: a zero whose drive moves what is read on a small radius makes up for it.
+    Without a zero that is not small the robot may have no pose at some stop.
     """
     with_all = frames(robot.solve(driven[0] + zeros, driven[1])).model_mm
     sizes: np.ndarray = np.abs(zeros) / np.array([LOST[unit] for unit in robot.parts.units])
     for k in np.flatnonzero(sizes):
         nominal = zeros * (np.arange(len(zeros)) != k)
-        moved = frames(robot.solve(driven[0] + nominal, driven[1])).model_mm - with_all
+        poses = robot.solve(driven[0] + nominal, driven[1])
+        if not poses.closed.all():
+            continue
+        moved = frames(poses).model_mm - with_all
         if np.sqrt((moved**2).sum(axis=1).mean()) < LARGE["mm"]:
             sizes[k] = 0.0
     return sizes

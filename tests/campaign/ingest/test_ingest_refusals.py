@@ -614,3 +614,16 @@ def test_distances_are_refused_once(tmp_path):
     frame = FIELD.drop(columns=MEASURED).assign(wire_1_mm=812.5, wire_2_mm=640.0)
     (problem,) = problems_of(frame, tmp_path)
     assert problem["column"] == "wire_1_mm, wire_2_mm" and problem["value"] == "distances, which are not read"
+
+
+@pytest.mark.parametrize("count", [3, 30])
+def test_undeclared_columns_list_the_known_ones_once(count, tmp_path):
+    """The list was printed for each undeclared column."""
+    names = [f"sensor_{k}" for k in range(count)]
+    path = tmp_path / "sensors.csv"
+    FIELD.assign(**dict.fromkeys(names, 1.0)).to_csv(path, index=False)
+    with pytest.raises(IngestError) as raised:
+        ingest(IngestSpec(str(path)), ROBOT)
+    text = str(raised.value)
+    assert all(name in text for name in names[:3]) and text.count("extra_columns: ignore") >= 3
+    assert text.count("known: ") == text.count("measured_rx_rad") == 1

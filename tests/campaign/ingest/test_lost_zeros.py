@@ -10,9 +10,11 @@ from scipy.spatial.transform import Rotation
 from rrru.calibration.calibrate import calibrate
 from rrru.calibration.campaign_fit import select
 from rrru.campaign import measurements as rows
+from rrru.campaign.ingest import zero_offsets
 from rrru.campaign.ingest.campaign_file import IngestSpec, ingest
 from rrru.diagnosis.result_notes import zero_notes
 from rrru.robots.hexapod import hexapod
+from rrru.robots.rrru3 import Rrru3
 from rrru.robots.serial import serial
 from rrru.studies.blind_validation.sentences.mistakes import read, right_file
 from tests.schemas import check_measurements
@@ -175,3 +177,20 @@ def test_a_base_that_is_off_by_some_mm_is_no_wrong_place_of_a_target(number, tmp
     own, handed = right_file(number, 902417, 300)
     assert own.name.startswith("delta")
     assert read(own, handed, tmp_path)[0] == "accepted"
+
+
+def test_a_zero_without_which_a_stop_has_no_pose_is_not_small():
+    """A frame was fitted to that stop's missing pose: "SVD did not converge", on a right file of a hexapod."""
+    robot = Rrru3()
+    position = np.array([[0.0, 0.0, 900.0], [190.23, 550.86, 1030.32]])
+    zeros = np.array([1e-4, 0.0, 0.15])
+    drive = robot.inverse(position) - zeros
+    assert robot.solve(drive + zeros, position).closed.all()
+    assert robot.solve(drive + zeros * [1.0, 0.0, 0.0], position).closed.tolist() == [True, False]
+
+    def frames(poses):
+        assert np.isfinite(poses.position_mm).all()
+        return zero_offsets.Framed(poses.position_mm, poses.position_mm, np.zeros_like(position), ())
+
+    far = zero_offsets._far_off(robot, (drive, position), frames, zeros)
+    assert far[:2].tolist() == [0.0, 0.0] and far[2] == pytest.approx(0.15 / np.radians(1.0))

@@ -9,6 +9,8 @@ from hypothesis import strategies as st
 from rrru.campaign.ingest.outliers import flag_outliers, frequent_jumps, outliers, reproduced
 from rrru.campaign.measurements import vector_columns
 from rrru.robots.hexapod import hexapod
+from rrru.studies.blind_validation.sentences import page
+from rrru.studies.blind_validation.sentences.draws import draw
 from tests.places import DATA
 
 NOISE_MM = 0.02
@@ -235,6 +237,18 @@ def test_errors_of_the_geometry_near_a_singularity_are_no_outliers(seed):
     marked = outliers(_stops(place, measured), 0.001, lambda: robot.parameter_jacobian(place, drive))
     # very near a singularity the first order is not enough
     assert marked[bad] and marked.sum() <= 2
+
+
+@pytest.mark.parametrize("wrong", [(), (20,)])
+def test_orientations_near_a_singularity_are_no_outliers(wrong, tmp_path):
+    """One stop of a right file of a hexapod was one; an orientation that is off by three degrees is one."""
+    own = draw(74, 4002, 300, 0.0)
+    table = own.table(own.readings(own.poses()), True)[~own.stops.fresh]
+    table.loc[[*wrong], "measured_rx_rad"] += np.radians(3.0)
+    own.write(tmp_path, table, "stops.csv")
+    section = own.section(tmp_path, "stops.csv")
+    found = page.read(section, own.nominal.section(str(tmp_path / own.robot_file), own.kind)).measurements
+    assert np.flatnonzero(found["status"] == "outlier").tolist() == [*wrong]
 
 
 @pytest.mark.parametrize("seed", range(8))

@@ -9,6 +9,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from rrru.diagnosis.verdict import GROUPED
+from rrru.diagnosis.verdict_text import causes_in_words
+
 UNKNOWN = "unknown kind"
 _NUMBER = r"-?\d+\.?\d*(?:e[+-]?\d+)?"
 _X = rf"(?P<value>{_NUMBER})"
@@ -61,8 +64,8 @@ _SENTENCES = {
     "causes by share": r"Causes by their share of the gap: (?P<listed>.*)\.",
     "a group of causes": r"One of these acts, and these data cannot tell which: (?P<listed>.*) "
     rf"\(probability that one does: {_P}\).*",
-    "probability of this answer": rf"(?:Probability that it acts: (?P<each>.*)\. )?Probability of (?:exactly )?this "
-    rf"answer(?:, alone or with further causes)?: {_P}\.",
+    "probability of this answer": rf"(?:Probability that it acts: (?P<each>.*)\. )?Probability of (?:exactly )?"
+    rf"(?:this answer|the causes of the corrected model)(?:, alone or with further causes)?: {_P}\.",
     "it does not repeat": rf"(?:{_SHARE}|An undetermined share|Some of it) does not repeat from pass to pass.*",
     "it is random error": rf"(?:{_SHARE}|An undetermined share|Some of it) is random error above the stated noise.*",
     "it looks random and is correlated": rf"(?:{_SHARE}|An undetermined share|Some of it) looks like random error, "
@@ -209,9 +212,11 @@ def _sizes_in(text, facts):
 def _of_facts(facts):
     """Claims of the numbers of the verdict."""
     named = [one["name"] for one in facts["effects"]]
+    # a group, of which the first is among the effects, is no name: its sentence is a claim of its own
+    alone = [one["name"] for one in facts["effects"] if one["decision"] != GROUPED]
     result = [
         Claim("verdict", _listed(facts), {"names": named, "unexplained": facts["unexplained"]}),
-        Claim("names in the verdict", _listed(facts), {"names": named}),
+        Claim("names in the verdict", _listed(facts), {"names": alone}),
         Claim("leg of the verdict", f"leg {facts['leg']}: {_listed(facts)}", {"leg": facts["leg"], "names": named}),
         Claim("gap_rms_mm", f"{facts['gap_rms_mm']:.4g} mm", {"value": facts["gap_rms_mm"]}),
         Claim("noise_rms_mm", f"{facts['noise_rms_mm']:.4g} mm", {"value": facts["noise_rms_mm"]}),
@@ -235,8 +240,8 @@ def _of_facts(facts):
 
 def _listed(facts):
     """The verdict in one line."""
-    names = [one["name"] for one in facts["effects"]] + ["unexplained"] * facts["unexplained"]
-    return f"{'+'.join(names) or 'none'} ({facts['probability']:.3f})"
+    names = [words for words, _ in causes_in_words(facts)] + ["unexplained"] * facts["unexplained"]
+    return f"{'+'.join(names).replace(' ', '_') or 'none'} ({facts['probability']:.3f})"
 
 
 def _of_tables(tables):
