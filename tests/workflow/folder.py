@@ -1,6 +1,7 @@
 """A folder of its own to run snakemake in, which sees the project's files through links."""
 
 import contextlib
+import copy
 import gc
 import hashlib
 import io
@@ -10,8 +11,11 @@ import runpy
 import subprocess
 import sys
 import warnings
+from functools import cache
 from pathlib import Path
 from unittest import mock
+
+import yaml
 
 from tests.places import ROOT
 
@@ -97,6 +101,28 @@ def _forked(_job, command, fname, **_options):
         raise subprocess.CalledProcessError(process.exitcode, command)
 
 
+# the project's configuration, which every run reads, takes a third of the time of a dry run
+_parse_yaml = yaml.load
+
+
+@cache
+def _parsed(text, loader):
+    """What PyYAML makes of a text."""
+    return _parse_yaml(text, Loader=loader)
+
+
+def _load_yaml(stream, Loader):  # noqa: N803
+    """In place of `yaml.load`: a text is parsed once in a process."""
+    return copy.deepcopy(_parsed(stream if isinstance(stream, str) else stream.read(), Loader))
+
+
+@cache
+def _freeze():
+    """What is there before the first run is no garbage of one, and is not looked at again by the collector."""
+    gc.collect()
+    gc.freeze()
+
+
 def run_here(folder, *targets, overlays=(), cores=2):
     """Exit code and output of snakemake within this process: without what its jobs print, with logs of failed ones.
 
@@ -120,6 +146,8 @@ def run_here(folder, *targets, overlays=(), cores=2):
         # of the jobs, whose folder is another one
         stack.enter_context(mock.patch.dict(os.environ, {"PYTHONPATH": str(ROOT)}))
         stack.enter_context(mock.patch.object(PythonScript, "_execute_cmd", _forked))
+        stack.enter_context(mock.patch.object(yaml, "load", _load_yaml))
+        _freeze()
         try:
             main(["--cores", str(cores), *targets, *chosen])
         except SystemExit as stopped:
