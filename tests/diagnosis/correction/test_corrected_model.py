@@ -202,15 +202,17 @@ def test_standard_errors_of_the_calibration_hold_the_truth(hexapod):
 
 @pytest.fixture(scope="module")
 def attached(tmp_path_factory):
-    """See `_attached`."""
-    return _attached(tmp_path_factory.mktemp("attached"))
+    """The Diagnosis of `_attached` with its corrected file, the true robot, that file, and the one that came."""
+    folder = tmp_path_factory.mktemp("attached")
+    result, true, section = _attached(folder)
+    return write_corrected(result, section, _MASSES, folder / "corrected.xml"), true, folder / "corrected.xml", section
 
 
 def _attached(folder):
     """A hexapod whose universal joints' axes do not meet, with its legs attached elsewhere than its file says.
 
-    Two reflectors with stated places are read one after the other. The Diagnosis with its corrected file, the true
-    robot, and the file that came.
+    Two reflectors with stated places are read one after the other. The Diagnosis, the true robot, and the file that
+    came.
     """
     generator = np.random.default_rng(1)
     apart = re.sub(r'(name="leg._v" axis="0 1 0")', r'\1 pos="0 0 0.015"', HEXAPOD.read_text())
@@ -245,8 +247,7 @@ def _attached(folder):
         rows.actuators(frame, given), rows.command(frame), rows.readings(frame, given.characteristic_length_mm)
     )
     known = MeasuredRobot(robot, _MASSES, _NOISE_MM, "attached")
-    result = diagnose(frame, known, GapSettings(("backlash",), draws=20))
-    return write_corrected(result, section, _MASSES, folder / "corrected.xml"), true, folder / "corrected.xml", section
+    return diagnose(frame, known, GapSettings(("backlash",), draws=20)), true, section
 
 
 _STATED_MM = {"a": (100.0, 0.0, 20.0), "b": (-60.0, 80.0, 20.0)}
@@ -317,7 +318,7 @@ def test_a_file_that_is_worse_than_the_calibration_says_so_in_the_headline(tmp_p
     They stand in for the legs' places where fewer parameters are chosen.
     """
     monkeypatch.setattr(general_robot, "LEFT_OF_DATA", 1e-2)
-    found, *_, section = _attached(tmp_path)
+    found, _, section = _attached(tmp_path)
     monkeypatch.setattr(corrected_file, "fitted_in_file", lambda inference, _: inference)
     _not_driven(found, monkeypatch)
     again = write_corrected(found, section, _MASSES, tmp_path / "corrected.xml").verdict
