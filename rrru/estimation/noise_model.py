@@ -229,25 +229,14 @@ def _too_large(stated_mm: float, found_mm: float, freedom: float) -> bool:
     return bool(chdtr(freedom, freedom * (found_mm / stated_mm) ** 2) < _MAX_P_OF_STATED)
 
 
-def high_frequency_noise(
-    data: FloatArray, columns: FloatArray, series: npt.NDArray[np.generic], chosen: npt.NDArray[np.bool_]
-) -> float:
-    """Standard deviation per axis of chosen rows (m,) by the upper half of the frequencies along each series (m,).
-
-    data (m, 3), of which columns (m, 3, k) are projected out. Smooth errors along a path without a column, such as
-    effects that a calibration lacks, do not reach these frequencies. NaN for less than one degree of freedom there.
-    """
-    together, wave = along_runs(np.concatenate([columns, data[..., None]], axis=-1), series)
-    flat = together.reshape(-1, together.shape[-1])
-    left, share = _left(flat[:, -1], flat[:, :-1])
-    seen = _Seen((left**2).reshape(-1, 3), share.reshape(-1, 3), wave, lengths(series))
-    return seen.rough(chosen)
-
-
 def high_frequency_noises(
     data: FloatArray, columns: FloatArray, series: npt.NDArray[np.generic], chosen: npt.NDArray[np.bool_]
 ) -> tuple[float, float]:
-    """Standard deviations of chosen rows (m,) and of the others by `high_frequency_noise`, NaN where it has none.
+    """Standard deviations per axis of chosen rows (m,) and of the others by the upper half of the frequencies.
+
+    data (m, 3), of which columns (m, 3, k) are projected out, along each series (m,). Smooth errors along a path
+    without a column, such as effects that a calibration lacks, do not reach these frequencies. NaN for less than one
+    degree of freedom there.
 
     Under one weight for all rows the residuals of the quieter rows have a part of the noise of the others. All rows are
     therefore divided by the standard deviation of their kind, and estimated again, until both ratios agree. Where the
@@ -257,7 +246,11 @@ def high_frequency_noises(
     for number in range(_MAX_WEIGHTINGS):
         weight = np.where(chosen, 1.0, ratio)[:, None]
         weighted, its_columns = data * weight, columns * weight[..., None]
-        found, its_others = (high_frequency_noise(weighted, its_columns, series, kind) for kind in (chosen, ~chosen))
+        together, wave = along_runs(np.concatenate([its_columns, weighted[..., None]], axis=-1), series)
+        flat = together.reshape(-1, together.shape[-1])
+        left, share = _left(flat[:, -1], flat[:, :-1])
+        seen = _Seen((left**2).reshape(-1, 3), share.reshape(-1, 3), wave, lengths(series))
+        found, its_others = (seen.rough(kind) for kind in (chosen, ~chosen))
         others = its_others / ratio
         equal = equal if number else (found, others)
         if not (found > 0.0 and others > 0.0):
