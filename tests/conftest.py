@@ -11,6 +11,10 @@ os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 import numpy as np  # noqa: E402
 import pytest  # noqa: E402
 
+from tests import compile_once  # noqa: E402
+
+compile_once.install()
+
 from rrru.kinematics import singularity  # noqa: E402
 from rrru.robots.rrru3 import Rrru3  # noqa: E402
 

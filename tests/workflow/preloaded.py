@@ -2,6 +2,9 @@
 
 from importlib import import_module
 
+from tests import compile_once
+
+compile_once.install()
 for _name in (
     "matplotlib.backends.backend_agg",
     "matplotlib.backends.backend_pdf",
