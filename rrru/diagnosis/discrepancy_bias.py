@@ -40,16 +40,16 @@ def discrepancy_covariance(fit: ModelFit) -> FloatArray:
     only the discrepancy along the runs that the fit has, has the prior odds of all together.
     """
     left = _Left.of(fit, whitening_of(fit.model.problem, 0))
-    logs, functions = list[float](), list[FloatArray]()
-    for log, made in _likely(fit, left):
-        logs.append(log)
-        functions.append(made)
+    sized = [_likely(left, design) for design in _designs(fit)]
+    logs = [log for sizes in sized for log, _ in sizes]
     along_runs = _Left.of(fit, whitening_of(fit.model.problem, fit.level)).log_evidence - left.log_evidence
-    share = np.exp(np.array(logs) - logsumexp([*logs, along_runs + np.log(max(len(logs), 1))]))
+    total = logsumexp([*logs, along_runs + np.log(max(len(logs), 1))])
     result = np.zeros_like(fit.estimate.covariance)
-    for part, made in zip(share, functions, strict=True):
-        if part > _LEAST_SHARE:
-            result += part * growth_with(fit.estimate, made)
+    # made anew: all functions of a long campaign together are too large for the memory
+    for design, sizes in zip(_designs(fit), sized, strict=True):
+        for log, size in sizes:
+            if (share := float(np.exp(log - total))) > _LEAST_SHARE:
+                result += share * growth_with(fit.estimate, size * design)
     return result
 
 
@@ -85,17 +85,15 @@ class _Left:
         return np.asarray(white - self.basis @ (self.basis.T @ white)).reshape(design.shape)
 
 
-def _likely(fit: ModelFit, left: _Left) -> Iterator[tuple[float, FloatArray]]:
-    """Log marginal likelihood of functions of each size over none, and what they make of the readings (m, 3, k)."""
-    rms = float(np.sqrt((left.residual**2).mean()))
-    for design in _designs(fit):
-        rest = left.of_functions(design)
-        whole, seen = (float(np.sqrt((one**2).sum(axis=-1).mean())) for one in (left.whiten(design), rest))
-        if seen <= _LEAST_LEFT * whole:
-            continue
-        regression = Regression(rest * (rms / seen), left.residual, 1.0)
-        for amplitude in OPTIONS.bias_amplitudes:
-            yield regression.log_evidence(amplitude), design * (amplitude * rms / seen)
+def _likely(left: _Left, design: FloatArray) -> list[tuple[float, float]]:
+    """Sizes that functions (m, 3, k) of unit size may have, each with its log marginal likelihood over none."""
+    rms, rest = float(np.sqrt((left.residual**2).mean())), left.of_functions(design)
+    whole, seen = (float(np.sqrt((one**2).sum(axis=-1).mean())) for one in (left.whiten(design), rest))
+    if seen <= _LEAST_LEFT * whole:
+        return []
+    unit = rms / seen
+    regression = Regression(rest * unit, left.residual, 1.0)
+    return [(regression.log_evidence(amplitude), amplitude * unit) for amplitude in OPTIONS.bias_amplitudes]
 
 
 def growth_with(estimate: Estimate, functions: FloatArray) -> FloatArray:

@@ -111,7 +111,7 @@ def _parsed(text, loader):
     return _parse_yaml(text, Loader=loader)
 
 
-def _load_yaml(stream, Loader):  # noqa: N803
+def _load_yaml(stream, Loader):
     """In place of `yaml.load`: a text is parsed once in a process."""
     return copy.deepcopy(_parsed(stream if isinstance(stream, str) else stream.read(), Loader))
 
