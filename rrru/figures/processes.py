@@ -14,14 +14,19 @@ _MOST = 2
 def drawing_processes() -> Iterator[Executor | None]:
     """Processes for `rrru.figures.drawing.draw_all`, as many as there are cores; None for a single core.
 
-    They import the main module of this process anew, which has to do nothing then.
+    None as well on a system that cannot synchronise processes. They import the main module of this process anew, which
+    has to do nothing then.
     """
     count = min(_MOST, _cores())
-    if count < 2:
+    try:
+        # a fork of a process with threads can hang
+        pool = ProcessPoolExecutor(count, multiprocessing.get_context("spawn")) if count > 1 else None
+    except (ImportError, NotImplementedError, OSError):
+        pool = None
+    if pool is None:
         yield None
         return
-    # a fork of a process with threads can hang
-    with ProcessPoolExecutor(count, multiprocessing.get_context("spawn")) as processes:
+    with pool as processes:
         for _ in range(count):
             processes.submit(_load)
         yield processes

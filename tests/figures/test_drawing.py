@@ -52,6 +52,16 @@ def test_a_single_core_draws_itself(monkeypatch):
         assert executor is None
 
 
+def test_a_system_that_cannot_synchronise_processes_draws_itself(monkeypatch):
+    def refuse(*_):
+        raise NotImplementedError("no semaphores")
+
+    monkeypatch.setattr(processes, "_cores", lambda: 2)
+    monkeypatch.setattr(processes, "ProcessPoolExecutor", refuse)
+    with processes.drawing_processes() as executor:
+        assert executor is None
+
+
 def test_the_command_computes_without_matplotlib_and_a_program_that_calls_it_is_not_run_again(tmp_path):
     # a process that draws would import this program anew, and call the command for ever
     (tmp_path / "program.py").write_text(
