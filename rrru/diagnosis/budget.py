@@ -88,7 +88,7 @@ def _numbers(
 
 @dataclass(frozen=True)
 class _Drawn:
-    """Draws (b,) of mean squares by name, of effects and of what is unexplained, in which of them each effect acts, and
+    """Draws (b,) of mean squares by name, of effects and the unexplained part, in which of them each effect acts, and
     draws of twice the products of two parts.
     """
 

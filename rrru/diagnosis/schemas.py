@@ -198,8 +198,8 @@ parameter              str    name of the parameter
 place                  str    the drive or leg of a parameter that each of several has, in words; empty for others
 unit                   str    unit of the value
 value                  float  fitted value
-standard_error         float? 1 sigma, correlated among them, with what an unexplained part makes in them; null at a
-    bound and for what was not fitted
+standard_error         float? 1 sigma, correlated among them, with the error that an unexplained part causes; null at
+    a bound and for what was not fitted
 low_95                 float? lower end of the 95 % interval; null for what was not fitted
 high_95                float? upper end of the 95 % interval, unequal distances from the value where a bound or a prior
     of two widths makes them so; null for what was not fitted
