@@ -9,8 +9,8 @@ effects' coefficients c. The model discrepancy w is for whatever the library doe
 Bayesian calibration of computer models, 2001). K is diagonal in the cosine basis of the run and falls with the
 frequency. So w is smooth along the path, plus a small part that is not. S is scaled so that `prior_scale` is the rms of
 the effect's part of the gap per axis over sigma, the calibration's share taken out; positive coefficients have the
-positive half of it. Prior scales are averaged over a grid, even in their logarithm. None makes a prior wider than the
-upper bound of the effect.
+positive half of it. Prior scales are averaged over a grid, even in their logarithm up to the upper bound of the effect,
+which no prior is wider than (`Prior.log_scales`).
 
 The shape parameters of an effect may lie between the points of their grid: each has a coefficient N(0, 1) on
 `LinearizedProblem.shape_columns`. So have payload and tilt wherever a compliant effect acts
@@ -23,7 +23,7 @@ All sets of effects then compare on the readings at which every effect of the li
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property, lru_cache, partial, wraps
+from functools import cached_property, lru_cache, partial, reduce, wraps
 from itertools import product
 from typing import Concatenate, ParamSpec, TypeVar
 
@@ -35,7 +35,7 @@ from rrru.diagnosis.aliases import Grams
 from rrru.diagnosis.discrepancy_basis import Library
 from rrru.diagnosis.evidence_kernels import log_sum_exp
 from rrru.diagnosis.hypothesis import Hypothesis
-from rrru.diagnosis.marginal_problem import Average, MarginalProblem, Prior
+from rrru.diagnosis.marginal_problem import PRIOR_SCALES, Average, MarginalProblem, Prior
 from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.payload_nuisance import (
     WEIGHT,
@@ -49,9 +49,6 @@ from rrru.diagnosis.state import LinearizedProblem
 from rrru.diagnosis.terms import EACH, SAME, EffectTerm, spread
 from rrru.diagnosis.whitened import DISCREPANCY_SCALES, Whitened
 from rrru.estimation.noise_model import NoiseModel
-
-PRIOR_SCALES = np.array([0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0])
-
 
 _P = ParamSpec("_P")
 _R = TypeVar("_R")
@@ -207,6 +204,12 @@ class ModelEvidence:
         """Priors of terms and after them of their shapes."""
         return [*map(self._prior, terms), *(self._priors[effect] for effect in self._keys(terms)[len(terms) :])]
 
+    @_on_complete
+    def log_scales(self, terms: Sequence[EffectTerm]) -> FloatArray:
+        """Log priors (m,) of all combinations of PRIOR_SCALES of some terms, in the order of `over_strengths`."""
+        each = (self._prior(term).log_scales for term in terms)
+        return np.ravel(reduce(np.add.outer, each, np.zeros(())))
+
     def _projected(self, terms: Sequence[EffectTerm], levels: Sequence[int] | IntArray) -> MarginalProblem:
         if not self._blocks(terms):
             return self._without_nuisance(terms, partial(self._grams, levels))
@@ -358,15 +361,16 @@ class ModelEvidence:
         """
         if len(terms) <= OPTIONS.max_jointly_averaged_effects:
             value, grid = self.over_strengths(terms, levels=[level])
-            return averaged(value, len(terms))[0], grid[value[0].argmax()]
+            return averaged(value, self.log_scales(terms))[0], grid[value[0].argmax()]
         best = np.ones(len(terms)) if start is None else np.array(start, dtype=float)
         losses, evidence = np.zeros(len(terms)), self._along(terms, level)
+        of_scales = [prior.log_scales for prior in map(self._prior, terms)]
         for _ in range(OPTIONS.prior_scale_sweeps):
             before = best.copy()
             for k in range(len(terms)):
                 value = evidence.of_term(k, best)
                 best[k], highest = PRIOR_SCALES[value.argmax()], value.max()
-                losses[k] = averaged(value, 1) - highest
+                losses[k] = averaged(value, of_scales[k]) - highest
             if (best == before).all():
                 break
         return highest + losses.sum(), best
@@ -479,6 +483,6 @@ def _combinations(*grids: tuple[float, ...]) -> FloatArray:
     return read_only(np.array(list(product(*grids)), dtype=float))
 
 
-def averaged(value: FloatArray, terms: int) -> FloatArray:
-    """Log evidence (..) over some terms' prior scales from (.., m); a grid cut short counts as a whole one."""
-    return np.asarray(log_sum_exp(value) - terms * np.log(len(PRIOR_SCALES)))
+def averaged(value: FloatArray, log_scales: FloatArray) -> FloatArray:
+    """Log evidence (..) over prior scales from that at each (.., m), and log priors (.., m) of these."""
+    return log_sum_exp(value + log_scales)

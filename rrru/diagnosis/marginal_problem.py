@@ -24,6 +24,8 @@ from rrru.arrays import BoolArray, FloatArray, IntArray
 from rrru.diagnosis import evidence_kernels as kernels
 from rrru.diagnosis.aliases import Grams
 
+PRIOR_SCALES = np.array([0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0])
+
 
 class Prior(NamedTuple):
     """Prior of k coefficients: columns' numbers, sizes at prior scale 1, largest sizes, and which are positive."""
@@ -42,6 +44,21 @@ class Prior(NamedTuple):
     def at(self, prior_scale: float) -> FloatArray:
         """Sizes at a prior scale."""
         return np.minimum(prior_scale * self.size, self.largest)
+
+    @property
+    def log_scales(self) -> FloatArray:
+        """Log prior (s,) of PRIOR_SCALES: even in the logarithm up to the scale at which no size grows any more.
+
+        The first scale from there on has what is left of its step, those behind it are the same prior and have none.
+        """
+        highest = (self.largest / self.size).max()
+        last = min(int(np.searchsorted(PRIOR_SCALES, highest)), len(PRIOR_SCALES) - 1)
+        weights = (np.arange(len(PRIOR_SCALES)) <= last).astype(float)
+        if last:
+            step = np.log(highest / PRIOR_SCALES[last - 1]) / np.log(PRIOR_SCALES[last] / PRIOR_SCALES[last - 1])
+            weights[last] = min(step, 1.0)
+        with np.errstate(divide="ignore"):
+            return np.asarray(np.log(weights / weights.sum()))
 
 
 @dataclass(frozen=True)

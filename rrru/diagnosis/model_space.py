@@ -34,10 +34,10 @@ from scipy.linalg import solve_triangular
 from rrru.arrays import BoolArray, FloatArray, IntArray
 from rrru.cache import read_only
 from rrru.diagnosis.discrepancy_basis import UNKNOWN
-from rrru.diagnosis.evidence import PRIOR_SCALES, ModelEvidence, averaged
+from rrru.diagnosis.evidence import ModelEvidence, averaged
 from rrru.diagnosis.evidence_kernels import log_evidence_of_blocks, log_sum_exp
 from rrru.diagnosis.hypothesis import Hypothesis
-from rrru.diagnosis.marginal_problem import posterior_mean
+from rrru.diagnosis.marginal_problem import PRIOR_SCALES, posterior_mean
 from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.posterior import Posterior, TermPriors, Weighed, Weigher
 from rrru.diagnosis.settings import Prior
@@ -189,7 +189,7 @@ class ModelSpace:
             gains = self._candidates.gains(terms, prior_scales, level)
             total = np.full(len(gains), -np.inf)
             may_act = gains[:, 0] > -np.inf
-            total[may_act] = averaged(gains[may_act], 1)
+            total[may_act] = averaged(gains[may_act], self._candidates.log_scales[may_act])
             self._gained[asked] = read_only((total, PRIOR_SCALES[gains.argmax(axis=1)]))
         return self._gained[asked]
 
@@ -293,8 +293,8 @@ class ModelSpace:
         evidence, best = self._evidence.none.copy(), np.ones((len(DISCREPANCY_SCALES), len(terms)))
         if terms:
             value, grid = self._evidence.over_strengths(terms)
-            levels = self._evidence.levels
-            evidence[levels], best[levels] = averaged(value, 1), grid[value.argmax(axis=1)]
+            levels, log_scales = self._evidence.levels, self._evidence.log_scales(terms)
+            evidence[levels], best[levels] = averaged(value, log_scales), grid[value.argmax(axis=1)]
         self._know(Hypothesis(tuple(terms), evidence, best))
         self._climbed.add(frozenset(terms))
 
@@ -341,6 +341,11 @@ class Candidates:
             for name in ("columns", "positive")
         )
         return numbers, np.cumsum([0, *sizes]), np.array(rows), positive
+
+    @cached_property
+    def log_scales(self) -> FloatArray:
+        """Log priors (c, s) of PRIOR_SCALES of each term."""
+        return np.array([self._evidence.log_scales((term,)) for term in self.terms]).reshape(-1, len(PRIOR_SCALES))
 
     def gains(self, terms: Sequence[EffectTerm], prior_scales: Sequence[float] | FloatArray, level: int) -> FloatArray:
         """Log evidence (c, s) that each of `self.terms` adds at PRIOR_SCALES to a set at its prior scales and a level.

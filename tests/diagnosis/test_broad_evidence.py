@@ -11,9 +11,9 @@ from scipy.optimize import lsq_linear
 from scipy.special import logsumexp
 from scipy.stats import multivariate_normal, norm
 
-from rrru.diagnosis.evidence import PRIOR_SCALES, ModelEvidence
+from rrru.diagnosis.evidence import ModelEvidence
 from rrru.diagnosis.hypothesis import Hypothesis
-from rrru.diagnosis.marginal_problem import Average
+from rrru.diagnosis.marginal_problem import PRIOR_SCALES, Average
 from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.state import LinearizedProblem
 from rrru.diagnosis.terms import EffectTerm

@@ -15,7 +15,8 @@ from scipy.stats import multivariate_normal, norm
 
 from rrru.campaign.noise import along_runs
 from rrru.diagnosis import evidence_kernels as kernels
-from rrru.diagnosis.evidence import PRIOR_SCALES, ModelEvidence
+from rrru.diagnosis.evidence import ModelEvidence, averaged
+from rrru.diagnosis.marginal_problem import PRIOR_SCALES, Prior
 from rrru.diagnosis.state import LinearizedProblem
 from rrru.diagnosis.terms import EACH, SAME, EffectTerm
 from rrru.diagnosis.whitened import DISCREPANCY_SCALES, spectrum
@@ -272,3 +273,28 @@ def test_no_prior_scale_makes_a_prior_wider_than_its_effect_allows():
     # prior scales beyond the bound are all the same hypothesis
     value, _ = bounded.over_strengths(term, None, [0])
     assert value[0, -1] == pytest.approx(value[0, -2]) and value[0, 0] != pytest.approx(value[0, -1])
+
+
+@pytest.mark.parametrize("highest", [0.03, 0.1, 0.2, 5.0, 10.0, 11.0, 250.0, 300.0, 1e4])
+def test_prior_scales_are_even_in_their_logarithm_up_to_the_bound(highest):
+    """The share of each is that of its step of a distribution that is even from the step below 0.1 up to the bound."""
+    size, nothing = np.array([2e-3, 5e-3]), np.zeros(2)
+    found = np.exp(Prior(nothing.astype(int), size, highest * size * [0.5, 1.0], nothing > 0.0).log_scales)
+    assert found.sum() == pytest.approx(1.0)
+    # PRIOR_SCALES as steps 0, 1, 2, .. of their logarithm
+    top = np.interp(np.log(highest), np.log(PRIOR_SCALES), np.arange(len(PRIOR_SCALES)))
+    drawn = np.ceil(np.linspace(-1.0, top, 100_001)[1:]).astype(int)
+    expected = np.bincount(drawn, minlength=len(PRIOR_SCALES)) / len(drawn)
+    np.testing.assert_allclose(found, expected, atol=1e-4)
+
+
+def test_an_upper_bound_makes_an_effect_more_probable_by_the_sizes_that_it_excludes_alone():
+    """All scales beyond the bound counted at it: an effect that could just be so large was four times as probable."""
+    free = _evidence()
+    term = (EffectTerm("free"),)
+    deviations = free.scales(term, [10.0])
+    narrow = SimpleNamespace(coordinates=replace(free.library["free"].coordinates, most=deviations))
+    bounded = replace(free, library=free.library | {"free": narrow})
+    alike = np.where(PRIOR_SCALES == 10.0, 0.0, -np.inf)
+    ratio = averaged(alike, bounded.log_scales(term)) - averaged(alike, free.log_scales(term))
+    assert ratio == pytest.approx(np.log(len(PRIOR_SCALES) / np.count_nonzero(PRIOR_SCALES <= 10.0)))

@@ -7,8 +7,8 @@ import pytest
 
 from rrru.diagnosis.calibrate import calibrate
 from rrru.diagnosis.discrepancy_basis import UNKNOWN
-from rrru.diagnosis.evidence import PRIOR_SCALES
 from rrru.diagnosis.hypothesis import Hypothesis
+from rrru.diagnosis.marginal_problem import PRIOR_SCALES
 from rrru.diagnosis.model_space import Candidates, ModelSpace, explore
 from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.posterior import Posterior, Weigher

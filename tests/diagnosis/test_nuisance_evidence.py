@@ -8,8 +8,8 @@ from scipy.special import logsumexp
 from scipy.stats import norm
 
 from rrru.diagnosis.calibrate import calibrate
-from rrru.diagnosis.evidence import PRIOR_SCALES
 from rrru.diagnosis.evidence_kernels import log_evidence
+from rrru.diagnosis.marginal_problem import PRIOR_SCALES
 from rrru.diagnosis.terms import EffectTerm
 from tests.diagnosis import arms, campaigns
 from tests.reference.nuisance_evidence import ProductModel, sample_evidence

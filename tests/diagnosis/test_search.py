@@ -53,7 +53,7 @@ def _library(*names):
 
 def _score(evidence, terms):
     """Log evidence (levels,) averaged over all combinations of prior scales."""
-    return averaged(evidence.over_strengths(terms)[0], len(terms)) if terms else evidence.none
+    return averaged(evidence.over_strengths(terms)[0], evidence.log_scales(terms)) if terms else evidence.none
 
 
 @pytest.mark.parametrize("acting", [(), ("servo_lag",), ("leg_asymmetry", "backlash")])
@@ -79,7 +79,8 @@ def test_prior_scales_averaged_one_by_one_are_near_the_average_over_all_combinat
     for level in (0, 2, 4):
         one_by_one, best = evidence.over_all_strengths(terms, level)
         together, grid = evidence.over_strengths(terms, None, [level])
-        assert one_by_one == pytest.approx(averaged(together, count)[0], abs=0.7 if count > 2 else 1e-9)
+        exact = averaged(together, evidence.log_scales(terms))[0]
+        assert one_by_one == pytest.approx(exact, abs=0.7 if count > 2 else 1e-9)
         assert (best == grid[together[0].argmax()]).mean() > 0.6
 
 

@@ -10,7 +10,8 @@ import pandas as pd
 from rrru.arrays import FloatArray
 from rrru.campaign import measurements as rows
 from rrru.diagnosis.drive_spectra import amplitudes
-from rrru.diagnosis.evidence import PRIOR_SCALES, averaged
+from rrru.diagnosis.evidence import averaged
+from rrru.diagnosis.marginal_problem import PRIOR_SCALES
 from rrru.diagnosis.terms import EffectTerm
 from rrru.studies.real.arms import Studied
 from rrru.studies.real.series import named
@@ -94,16 +95,18 @@ def _waves(studied: Studied) -> str:
     if studied.diagnosis is None or not all(name in library for name in named):
         return ""
     inference = studied.diagnosis.inference
+    evidence = inference.evidence
     hypothesis, level = inference.hypothesis, inference.level
     others = tuple(term for term in hypothesis.terms if term.effect not in named)
     fixed = [[strength] for strength in hypothesis.strengths_of(others, level)]
 
     def log_evidence(*names: str) -> float:
         """Log evidence of effects added to the others."""
-        terms, grids = (*others, *map(EffectTerm, names)), (*fixed, *(PRIOR_SCALES for _ in names))
-        return float(averaged(inference.evidence.over_strengths(terms, grids, [level])[0], len(names))[0])
+        added = tuple(map(EffectTerm, names))
+        value, _ = evidence.over_strengths((*others, *added), (*fixed, *(PRIOR_SCALES for _ in names)), [level])
+        return float(averaged(value, evidence.log_scales(added))[0])
 
-    neither = log_evidence() if others else inference.evidence.none[level]
+    neither = log_evidence() if others else evidence.none[level]
     function, waves = map(log_evidence, named)
     if function < neither:
         return ""
