@@ -100,9 +100,9 @@ def decide(posterior: Posterior, library: Mapping[str, Effect], small: Collectio
     """Verdict of a Posterior; library: the effects that may be named, by name; small: those that are not, see below.
 
     Nothing is named as long as "none" has a probability of 0.2: a false alarm costs more than a gap too small to
-    matter. Where something acts and no cause is probable enough, the most probable answer with a cause is given, and
-    its causes are called possible. Something is unexplained where that is more probable than not; an effect that makes
-    a small part of the gap may then be a part of that.
+    matter. Where something acts and no cause is probable enough, or the named ones alone are excluded, the most
+    probable answer that holds these is given, and its further causes are called possible. Something is unexplained
+    where that is more probable than not; an effect that makes a small part of the gap may then be a part of that.
     """
     sets, unknown = posterior.sets, posterior.probability_unexplained
     none = sets.get(_NONE, 0.0)
@@ -117,10 +117,8 @@ def decide(posterior: Posterior, library: Mapping[str, Effect], small: Collectio
         effects = tuple(name for name in order if marginal[name] >= OPTIONS.min_named_probability)
         groups = _groups(posterior, [name for name in order if name not in effects], marginal)
         effects += tuple(group.names[0] for group in groups)
-        if not (effects or unexplained):
-            # something acts, and no cause is probable enough: the most probable answer that has one
-            best = max((key for key in sets if key != _NONE), key=lambda key: sets[key])
-            effects, unexplained = tuple(sorted(best[0])), best[1]
+        if not unexplained:
+            effects, unexplained = _completed(sets, effects, groups)
     named = {name for name in effects if marginal[name] >= OPTIONS.min_named_probability}
     chosen = frozenset(effects), unexplained
     # with something unexplained more effects may act, as a part of that
@@ -149,6 +147,24 @@ def decide(posterior: Posterior, library: Mapping[str, Effect], small: Collectio
         groups,
         sure=float(min(decisions)),
     )
+
+
+def _completed(
+    sets: Mapping[CauseSet, float], effects: tuple[str, ...], groups: tuple[Group, ...]
+) -> tuple[tuple[str, ...], bool]:
+    """Effects of the answer, and whether something is unexplained, where those that are named cannot be all that acts.
+
+    sets: probability of each set; effects: the named ones with the first of each group, () for none.
+    """
+    members = {name for group in groups for name in group.names}
+    named = frozenset(effects) - members
+    alone = sum(p for (acting, flag), p in sets.items() if not flag and named <= acting <= named | members)
+    firsts = frozenset(effects)
+    with_these = [key for key in sets if key != _NONE and key[0] >= firsts]
+    if (effects and alone > OPTIONS.min_possible_probability) or not with_these:
+        return effects, False
+    best = max(with_these, key=lambda key: sets[key])
+    return (*effects, *sorted(best[0] - firsts - members)), best[1]
 
 
 def _groups(posterior: Posterior, names: Iterable[str], marginal: Mapping[str, float]) -> tuple[Group, ...]:

@@ -44,6 +44,7 @@ _READABLE = {"1": ("", 1.0), "rad/(N mm)": ("µrad/(N m)", 1e9), "mm/(N mm)": ("
 _READABLE |= {"mm/N": ("µm/N", 1e3), "1/K": ("µm/(m K)", 1e6), "mm/s": ("µm/s", 1e3), "rad/s": ("µrad/s", 1e6)}
 _LIMITED = (NO_PAYLOAD, WITHIN_LIMITS)
 _UNSURE = "No cause is probable enough to be named; the most probable answer follows."
+_NOT_ALL = "More acts than what is named, and no further cause is probable enough; the most probable answer follows."
 _NO_SIZE = "Its size is not determined, because no masses of the links are stated."
 # what looks like random error above the stated noise, by the note on repeated poses; else it does not repeat
 _ABOVE_NOISE = "is random error above the stated noise. Repeatability is unknown:"
@@ -74,7 +75,12 @@ def causes_in_words(facts: Facts) -> list[tuple[str, Facts]]:
     """Each cause of the answer in words, with its share and size: an effect, or a group as "one or another"."""
     groups = {group["names"][0]: group for group in facts["groups"]}
     parts = [groups.get(effect["name"], effect) for effect in facts["effects"]]
-    return [(" or ".join(map(readable, part.get("names") or [part["name"]])), part) for part in parts]
+    return [(" or ".join(map(readable, part["names"])) if "names" in part else _name(part), part) for part in parts]
+
+
+def _name(effect: Facts) -> str:
+    """The name of an effect of the answer, with "possibly" where it is not probable enough for a name."""
+    return f"{'possibly ' if effect['decision'] == POSSIBLE else ''}{readable(effect['name'])}"
 
 
 def sure_in_words(facts: Facts) -> str:
@@ -110,7 +116,8 @@ def _causes(facts: Facts) -> list[str]:
     single = [effect for effect in facts["effects"] if effect["name"] not in groups]
     small = _small(facts, groups) if with_shares else set()
     said = [_by_share(facts, groups, small)] if with_shares and len(facts["effects"]) > 1 else []
-    said = ([_UNSURE] if any(effect["decision"] == POSSIBLE for effect in single) else []) + said
+    if unsure := sum(effect["decision"] == POSSIBLE for effect in single):
+        said = [_UNSURE if unsure == len(facts["effects"]) else _NOT_ALL, *said]
     single = [effect for effect in single if effect["name"] not in small]
     of_gap = [" of the gap"] + [""] * len(single)
     said += [_cause(effect, of, with_shares, facts) for effect, of in zip(single, of_gap, strict=False)]
@@ -196,7 +203,7 @@ def _by_share(facts: Facts, groups: Mapping[str, Facts], small: Collection[str])
             listed.append((group["share"], " or ".join(map(readable, group["names"]))))
         else:
             known = effect["share"] is None or is_determined(effect)
-            name = readable(effect["name"])
+            name = _name(effect)
             listed.append((effect["share"] or 0.0, name if known else f"{name} (share not determined)"))
     words = [
         name if name.endswith(")") else f"{name} {small_percent(share)}"
@@ -264,7 +271,7 @@ def _name_and_sizes(effect: Facts, facts: Facts) -> tuple[str, bool]:
     many = len(sizes) > OPTIONS.max_listed_numbers
     # the coefficients of a function say less than its largest value, which follows
     listed = [] if many and effect["worst_places"] else [f"{len(sizes)} numbers"] if many else sizes
-    return "".join([readable(effect["name"]), place, *(f", {one}" for one in listed)]), massless and not sizes
+    return "".join([_name(effect), place, *(f", {one}" for one in listed)]), massless and not sizes
 
 
 def _worst(places: Sequence[Facts]) -> str:

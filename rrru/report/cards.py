@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 from rrru.diagnosis.number_text import is_determined, percent, readable, rounded, share_with_interval
+from rrru.diagnosis.verdict import POSSIBLE
 from rrru.diagnosis.verdict_facts import not_corrected
 from rrru.diagnosis.verdict_text import causes_in_words, sure_in_words
 from rrru.report import worth
@@ -145,7 +146,8 @@ def _advice(facts: Facts) -> list[Advice]:
         alone = "names" not in part
         for one in [part] if alone else part["causes"]:
             words = readable(one["name"]).capitalize()
-            cause = f"{words} {one['place']}".strip() if alone else f"{words}, if it acts"
+            sure = alone and one["decision"] != POSSIBLE
+            cause = f"{words} {one['place']}".strip() if sure else f"{words}, if it acts"
             result.append(Advice(cause, one["inspect"], one["remedy"], one["source"]))
     return [one for one in result if one.inspect]
 

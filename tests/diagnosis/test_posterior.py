@@ -1,5 +1,6 @@
 """Terms, priors and probabilities on made-up evidence; the verdict on made-up posteriors."""
 
+from itertools import combinations
 from math import comb
 from types import SimpleNamespace
 
@@ -274,6 +275,32 @@ def test_where_no_cause_is_probable_enough_the_most_probable_answer_stands_and_i
     assert set(verdict.effects) == {"servo_lag", "backlash"} and verdict.groups == ()
     assert {verdict.decision(name) for name in verdict.effects} == {"possible"} and verdict.sure < 0.7
     assert not set(verdict.confounded_with) & set(verdict.effects)
+
+
+@pytest.mark.parametrize(("alone", "effects"), [(0.04, {"axis_tilt", "servo_lag"}), (0.06, {"axis_tilt"})])
+def test_named_causes_that_cannot_be_all_that_acts_are_completed_by_the_most_probable_answer(alone, effects):
+    """The answer "axis tilt" had a probability of 3e-52, since two further effects or something unexplained act."""
+    verdict = _decided(
+        ((TILT, LAG), 0.34, False),
+        ((TILT, BACKLASH), 0.3, False),
+        ((TILT, LAG, BACKLASH), 0.3 - alone, False),
+        ((TILT,), 0.06, True),
+        ((TILT,), alone, False),
+    )
+    assert set(verdict.effects) == effects and verdict.groups == () and not verdict.unexplained
+    assert verdict.decision("axis_tilt") == "named" and verdict.decision("servo_lag") == "possible"
+    assert verdict.probability == pytest.approx(0.34 if len(effects) > 1 else alone)
+
+
+def test_named_causes_that_no_set_holds_together_stay():
+    verdict = _decided(*((terms, 0.25, False) for terms in combinations((LAG, TILT, BACKLASH, HEAT), 3)))
+    assert set(verdict.effects) == {"servo_lag", "axis_tilt", "backlash", "thermal_growth"}
+
+
+def test_a_group_may_be_what_acts_next_to_the_named_causes():
+    """No set of the first of the group alone has to be probable: one of the others does as well."""
+    verdict = _decided(((LAG, TILT), 0.5, False), ((LAG, BACKLASH), 0.48, False), ((LAG,), 0.02, False))
+    assert set(verdict.effects) == {"servo_lag", "axis_tilt"} and len(verdict.groups) == 1
 
 
 def test_causes_that_have_nothing_to_do_with_each_other_are_no_group():

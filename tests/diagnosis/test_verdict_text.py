@@ -301,6 +301,20 @@ def test_where_no_cause_is_named_the_most_probable_answer_says_so():
     assert said[1] not in answered()["sentences"]
 
 
+def test_where_more_acts_than_what_is_named_the_further_causes_are_called_possible():
+    causes = synthetic_gap.gap_attribute(CAMPAIGN)
+    causes = causes.assign(decision=causes["decision"].mask(causes["effect"] == "backlash", "possible"))
+    facts = answered(causes=causes)
+    said = facts["sentences"]
+    assert said[1].startswith("More acts than what is named, and no further cause is probable enough; ")
+    assert sum(" is possibly backlash" in one for one in said) == 1
+    assert any(" is link flexure" in one for one in said)
+    assert "possibly backlash" in next(one for one in said if one.startswith("Causes by their share"))
+    assert [words for words, _ in verdict_text.causes_in_words(facts)] == ["link flexure", "possibly backlash"]
+    of_backlash = next(one for one in card(facts).advice if "acklash" in one.cause)
+    assert of_backlash.cause == "Backlash, if it acts"
+
+
 @pytest.mark.parametrize(("sure", "said"), [(0.49, False), (0.51, True)])
 def test_what_does_not_repeat_is_said_where_it_more_likely_acts_than_not(sure, said):
     budget = synthetic_gap.gap_budget(CAMPAIGN)

@@ -42,7 +42,12 @@ def leave(folder, campaign, frame, noise_mm=NOISE_MM, nominal=NOMINAL, sets=SETS
         place / "gap_points.parquet"
     )
     part = {"part": "backlash", "kind": "effect", "rms_mm": 0.01, "share": 1.0, "share_low": 0.8, "share_high": 1.2}
-    answer = {"effects": [{"name": "backlash"}], "unexplained": False, "probability": 0.9, "gap_rms_mm": 0.01}
+    answer = {
+        "effects": [{"name": "backlash", "decision": "named"}],
+        "unexplained": False,
+        "probability": 0.9,
+        "gap_rms_mm": 0.01,
+    }
     answer |= {"groups": [*groups]}
     json_files.write(answer | {"budget": [part], "noise_rms_mm": noise_mm * 3.0**0.5}, place / "verdict.json")
 

@@ -11,8 +11,9 @@ from rrru.studies.blind_validation.sentences import claims as claims_module
 from rrru.studies.blind_validation.sentences.claims import UNKNOWN, Claim
 from rrru.studies.blind_validation.sentences.truth import Truth
 
-_EFFECT = {"name": "backlash", "place": "at q2", "share": 0.8}
+_EFFECT = {"name": "backlash", "place": "at q2", "share": 0.8, "decision": "named"}
 _FACTS = {"effects": [_EFFECT], "unexplained": False, "probability": 0.97, "notes": [], "corrected_file": None}
+_POSSIBLE = _FACTS | {"effects": [_EFFECT | {"decision": "possible"}], "groups": []}
 _NONE = {"effects": [], "unexplained": False, "probability": 0.97, "notes": [], "corrected_file": None}
 _OUTSIDE = {"effects": [], "unexplained": True, "probability": 0.97, "notes": [], "corrected_file": None}
 _GRID = np.stack(np.meshgrid(*[np.arange(5.0)] * 3), axis=-1).reshape(-1, 3)
@@ -99,6 +100,7 @@ _CASES = [
     ),
     ("something is unexplained", ({}, _UNKNOWN, _OUTSIDE), ({}, {}, _OUTSIDE)),
     ("the unexplained follows", ({}, _UNKNOWN, _OUTSIDE), ({}, {}, _OUTSIDE)),
+    ("more acts", ({}, {}, _POSSIBLE), ({}, {}, _FACTS | {"groups": []})),
     ("probability of this answer", ({}, {}, _FACTS), ({}, {}, _OUTSIDE)),
     ("probability", ({}, {}, _FACTS), ({}, {}, _NONE)),
     ("it does not repeat", ({"share": "0"}, {}, _FACTS), ({"share": "14"}, {}, _FACTS)),
@@ -252,7 +254,7 @@ _CASES = [
 # kinds that say nothing that could be false
 _NEVER = {
     *("these data cannot rule out", "next, nothing would settle it", "the fit did not converge"),
-    *("runs are limited", "causes by share", "no cause is sure"),
+    *("runs are limited", "causes by share", "no cause is sure", "a possible cause of the answer"),
     *("an effect is not tested", "the file is not corrected", "how the file was driven", "a part of a sentence"),
     *("a reflector is assumed", "jumps are frequent", "rows without a pose", "masses are unknown"),
     "the mounting is assumed",

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from rrru.diagnosis.verdict import GROUPED
+from rrru.diagnosis.verdict import GROUPED, POSSIBLE
 from rrru.diagnosis.verdict_text import causes_in_words
 
 UNKNOWN = "unknown kind"
@@ -47,6 +47,9 @@ _SENTENCES = {
     "no cause is named": r"No cause is named: .*\.",
     "what to check": r"Next: check units, signs and order of the drives, .*",
     "the corrected file is worse": r"The corrected file has a residual error of .*",
+    "a possible cause": rf"{_NUMBER} %{_ENDS} is possibly (?P<name>[a-z ]+) "
+    rf"\(probability that it acts: (?P<acts>[^)]*)\)\. .*",
+    "a possible cause of the answer": r"(?:.* is|Also there is) possibly .*",
     "a cause with a share": rf"{_SHARE} is {_CAUSE}",
     "a cause with a size": rf"{_X} mm is {_CAUSE}",
     "a cause without a share": rf"(?:Also there is|An undetermined share(?: of the gap)? is) {_CAUSE}",
@@ -57,9 +60,8 @@ _SENTENCES = {
     "shares overlap": r"These shares add up to more than the gap.*",
     "something is unexplained": rf"(?:Another|It is systematic, and no effect .*:) "
     rf"(?:(?P<share>{_NUMBER}) %|(?:an )?undetermined share) .*",
-    "a possible cause": rf"{_NUMBER} %{_ENDS} is possibly (?P<name>[a-z ]+) "
-    rf"\(probability that it acts: (?P<acts>[^)]*)\)\. .*",
     "no cause is sure": r"No cause is probable enough to be named; .*",
+    "more acts": r"More acts than what is named, .*",
     "the unexplained follows": r"The unexplained part follows .*",
     "causes by share": r"Causes by their share of the gap: (?P<listed>.*)\.",
     "a group of causes": r"One of these acts, and these data cannot tell which: (?P<listed>.*) "
@@ -186,7 +188,8 @@ def _inside(text, stated):
         names = (
             re.sub(r"( less than)? \d+ %$| \(share not determined\)$", "", one) for one in stated["listed"].split(", ")
         )
-        result += [Claim("a cause by its share", text, {"name": name}) for name in names if not name[0].isdigit()]
+        sure = [name for name in names if not (name[0].isdigit() or name.startswith("possibly "))]
+        result += [Claim("a cause by its share", text, {"name": name}) for name in sure]
     if "probability" in stated:
         result.append(Claim("probability", text, stated))
     if "names" in stated and text.startswith(("These data", "Parts of")):
@@ -213,7 +216,7 @@ def _of_facts(facts):
     """Claims of the numbers of the verdict."""
     named = [one["name"] for one in facts["effects"]]
     # a group, of which the first is among the effects, is no name: its sentence is a claim of its own
-    alone = [one["name"] for one in facts["effects"] if one["decision"] != GROUPED]
+    alone = [one["name"] for one in facts["effects"] if one["decision"] not in (GROUPED, POSSIBLE)]
     result = [
         Claim("verdict", _listed(facts), {"names": named, "unexplained": facts["unexplained"]}),
         Claim("names in the verdict", _listed(facts), {"names": alone}),

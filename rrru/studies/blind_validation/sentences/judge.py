@@ -9,6 +9,7 @@ import re
 
 import numpy as np
 
+from rrru.diagnosis.verdict import POSSIBLE
 from rrru.estimation.intervals import QUANTILE_95
 from rrru.studies.blind_validation.sentences.claims import PATTERNS, UNKNOWN
 
@@ -99,6 +100,13 @@ def _one_of(names, truth):
 def _group(stated, truth, _facts):
     """One of the causes of a group acts."""
     return _one_of(re.findall(r"([a-z ]+?) (?:more than |less than )?[\d.]+(?:, |$)", stated["listed"]), truth)
+
+
+def _more(_stated, truth, facts):
+    """Something else acts than the named causes and groups."""
+    named = {one["name"] for one in facts["effects"] if one["decision"] != POSSIBLE}
+    named |= {name for group in facts["groups"] for name in group["names"]}
+    return truth.outside or not set(truth.effects) <= named
 
 
 def _probability_of_cause(stated, truth, _facts):
@@ -374,6 +382,7 @@ _JUDGES = {
     "a group of causes": _group,
     "probability of a cause": _probability_of_cause,
     "a possible cause": lambda stated, t, f: _probability_of_cause(stated | {"probability": stated["acts"]}, t, f),
+    "more acts": _more,
     "probability of this answer": _probability,
     "it does not repeat": _scatter,
     "it is random error": _scatter,
