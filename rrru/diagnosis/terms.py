@@ -68,11 +68,12 @@ def variants(effect: TestedEffect) -> tuple[EffectTerm, ...]:
     """All terms of an effect: each shape with each choice of legs that makes a difference.
 
     One value for all legs is tried for coordinates that cannot be negative: sizes of one design, unlike the signed
-    errors of an assembly, and unlike the joints of an arm. An effect of a single leg acts on that one.
+    errors of an assembly, and unlike the joints of an arm; and for those that all drives may have in common. An effect
+    of a single leg acts on that one.
     """
     coordinates = effect.coordinates
     legs: list[OnLegs] = np.unique(coordinates.legs).tolist() if per_leg(effect) else []
-    same = legs_alike(effect) and coordinates.alike and coordinates.positive.all()
+    same = legs_alike(effect) and (coordinates.common or (coordinates.alike and coordinates.positive.all()))
     choices = legs if len(legs) == 1 else [EACH, *([SAME] if same else []), *legs]
     return tuple(EffectTerm(effect.name, shape, one) for shape in range(len(coordinates.shapes)) for one in choices)
 

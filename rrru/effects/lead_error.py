@@ -5,6 +5,9 @@ lead of (1 + s_k) times that, the slide of drive k stands at (1 + s_k) q_k, so t
 
     dq_k = s_k q_k
 
+All slides go one share too far where their screws are of one lot, or all as warm: as if the instrument had another
+millimetre (`tracker_scale`), which no campaign tells from it where all directions are those of slides.
+
 It enters at the drive's value. The constant part is the zero offset of the drive, which the calibration finds. It is
 linear, does not depend on time, load or direction, and repeats exactly.
 
@@ -14,6 +17,8 @@ temperature (`screw_growth`).
 Source: ISO 230-2, mean bidirectional positional deviation; ISO 3408-3, travel deviation of ball screws: 23 um per
 300 mm in grade 5, 52 in grade 7 and 210 in grade 10, which are 8e-5, 1.7e-4 and 7e-4.
 """
+
+from dataclasses import replace
 
 import numpy as np
 
@@ -29,7 +34,10 @@ _TYPICAL, _MOST, _SOURCE = 2e-4, 1e-2, "ISO 3408-3, grades 5 to 10: 8e-5 to 7e-4
 def for_robot(robot: Robot) -> Effect | None:
     """The effect of all drives that slide, None where none does."""
     sliding = drives_of(robot, "mm")
-    return proportional("lead_error", sliding, (_TYPICAL, _MOST, _SOURCE)) if len(sliding) else None
+    if not len(sliding):
+        return None
+    effect = proportional("lead_error", sliding, (_TYPICAL, _MOST, _SOURCE))
+    return replace(effect, coordinates=replace(effect.coordinates, common=True))
 
 
 def proportional(name: str, drives: IntArray, size: tuple[float, float, str]) -> Effect:

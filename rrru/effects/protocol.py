@@ -188,8 +188,9 @@ class Coordinates:
 
     typical (c,): prior s.d., the sizes that a worn or badly assembled robot may have; most (c,): upper bounds of the
     sizes; legs (c,): number of the leg or drive from 1 on, 0 where the coordinate acts on all; positive (c,): whether
-    it cannot be negative; alike: whether legs are of one design, so that one value may hold for all; shapes: grid of
-    the hyperparameters, the parameters that are no coordinates; to_values: from coordinates (c,) and a shape to
+    it cannot be negative; alike: whether legs are of one design, so that one value may hold for all; common: whether
+    something that all drives share, such as a temperature, may give them one value of either sign; shapes: grid of the
+    hyperparameters, the parameters that are no coordinates; to_values: from coordinates (c,) and a shape to
     parameter values (p,); weights: prior probabilities of the shapes, None where all are equal; searched: continuous
     hyperparameter in addition to the listed shapes; stated: number of shapes, from the first on, that the user has
     stated; doubt: relative s.d. of a hyperparameter, or s.d. of the order of a searched one; broad: whether the
@@ -206,6 +207,7 @@ class Coordinates:
     to_values: Callable[[FloatArray, Mapping[str, float]], FloatArray]
     shapes: tuple[Mapping[str, float], ...] = ({},)
     alike: bool = True
+    common: bool = False
     most: FloatArray | float = np.inf
     weights: tuple[float, ...] | None = None
     searched: Search | None = None

@@ -50,6 +50,22 @@ def test_a_screw_that_grows_from_its_middle_is_found_with_its_time_constant():
     assert numbers["time_constant"] == pytest.approx(700.0, rel=0.15)
 
 
+def test_slides_that_are_all_long_by_one_share_may_be_measured_in_another_millimetre():
+    """Of screws that are warm, or of one lot, three equal shares were taken for chance: 0.99 for "tracker scale"."""
+    found, *_ = _diagnosed(campaign(grown=lambda way, time: 3e-4 * way, seed=4))
+    posterior = found.inference.posterior
+    assert posterior.any_of(["tracker_scale", "lead_error"]) > 0.99
+    # as the readings are the same, what is left are the priors: of a lead error that it is one of all slides
+    assert 0.1 < posterior.marginal("lead_error") < 0.5 and "lead_error" in found.decided.confounded_with
+
+
+def test_slides_that_are_long_by_shares_of_their_own_are_not_measured_in_another_millimetre():
+    found, numbers, errors = _diagnosed(campaign(grown=lambda way, time: way * [3e-4, -1e-4, 2e-4], seed=5))
+    assert found.verdict["effects"] == "lead_error" and found.decided.groups == ()
+    for drive, true in enumerate((3e-4, -1e-4, 2e-4), start=1):
+        assert _off(numbers, errors, f"lead_error{drive}", true) < 3.0
+
+
 def test_rivals_that_need_times_are_separated_by_poses_that_have_times():
     """A campaign with times and without a column of speeds: poses are planned at the speed by the times."""
 
