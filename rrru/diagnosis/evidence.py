@@ -207,8 +207,18 @@ class ModelEvidence:
     @_on_complete
     def log_scales(self, terms: Sequence[EffectTerm]) -> FloatArray:
         """Log priors (m,) of all combinations of PRIOR_SCALES of some terms, in the order of `over_strengths`."""
-        each = (self._prior(term).log_scales for term in terms)
-        return np.ravel(reduce(np.add.outer, each, np.zeros(())))
+        return np.ravel(reduce(np.add.outer, map(self._log_scales_of, terms), np.zeros(())))
+
+    def _log_scales_of(self, term: EffectTerm) -> FloatArray:
+        """Log priors (s,) of PRIOR_SCALES of one term."""
+        if term not in self._log_scales:
+            self._log_scales[term] = self._prior(term).log_scales
+        return self._log_scales[term]
+
+    @cached_property
+    def _log_scales(self) -> dict[EffectTerm, FloatArray]:
+        """What `_log_scales_of` has given."""
+        return {}
 
     def _projected(self, terms: Sequence[EffectTerm], levels: Sequence[int] | IntArray) -> MarginalProblem:
         if not self._blocks(terms):
@@ -364,7 +374,7 @@ class ModelEvidence:
             return averaged(value, self.log_scales(terms))[0], grid[value[0].argmax()]
         best = np.ones(len(terms)) if start is None else np.array(start, dtype=float)
         losses, evidence = np.zeros(len(terms)), self._along(terms, level)
-        of_scales = [prior.log_scales for prior in map(self._prior, terms)]
+        of_scales = [*map(self._log_scales_of, terms)]
         for _ in range(OPTIONS.prior_scale_sweeps):
             before = best.copy()
             for k in range(len(terms)):
