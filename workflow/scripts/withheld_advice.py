@@ -16,7 +16,7 @@ from rrru.studies.blind_validation.schemas import TABLES
 def main(settings, inputs, outputs):
     """Write how many ambiguous robots the advice settles; reads only those robots' points from the chunks."""
     verdicts = tables.read(inputs["withheld_verdicts"], columns=UNSURE)
-    names = ambiguous(verdicts, settings["withheld"]["advice"])
+    names, most, followed_robots = ambiguous(verdicts), settings["withheld"]["advice"], 0
     # no robot has the name ""
     chosen = [("robot", "in", names or [""])]
     conditions, library = Conditions.from_config(settings), GapSettings.from_config(settings["gap"], settings["seed"])
@@ -26,9 +26,13 @@ def main(settings, inputs, outputs):
     for path in inputs["withheld_measurements"]:
         points = tables.read(path, rows=chosen)
         for name in [name for name in names if name in set(points["robot"])]:
+            if followed_robots == most:
+                break
             own = points[points["robot"] == name].drop(columns=["robot", "kind"]).reset_index(drop=True)
             known = MeasuredRobot(mechanism, masses, conditions.noise_mm, name)
-            result.extend(follow(robot_of(drawn[name]), own, conditions, known, library))
+            rows = follow(robot_of(drawn[name]), own, conditions, known, library)
+            followed_robots += bool(rows)
+            result.extend(rows)
     columns = next(table.names for table in TABLES if table.name == "withheld_advice")
     followed = pd.DataFrame(result, columns=columns)
     frames = {"withheld_advice": followed, "withheld_advice_summary": advice_summary(followed)}

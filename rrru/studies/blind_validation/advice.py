@@ -1,5 +1,9 @@
 """Whether an advised run settles an ambiguous verdict, compared with a random run: driven, added and diagnosed.
 
+A verdict is settled where it is right, and sure of each single decision: of each cause, or group of causes, that it
+names, and of each that it does not. The probability of all of them together would never be high: few points never tell
+that no further small cause acts at all.
+
 The advice uses measurements alone. The robot that made them also drives the advised run. Lengths mm, times s.
 """
 
@@ -15,9 +19,9 @@ from rrru.pipeline.advised import advised_runs
 from rrru.seeds import stream
 from rrru.studies.blind_validation.noise import NoiseModel, with_noise
 from rrru.studies.blind_validation.summary import wilson
-from rrru.studies.blind_validation.verdicts import is_right
+from rrru.studies.blind_validation.verdicts import NONE, UNEXPLAINED, is_outside
 
-# a correct answer of this probability is settled; number of rounds in which the advice is followed
+# a correct answer of decisions this probable is settled; number of rounds in which the advice is followed
 SURE, ROUNDS = 0.9, 3
 ARMS = ("advised", "random")
 # columns of withheld_verdicts that `ambiguous` reads
@@ -42,26 +46,67 @@ class Arm:
     def advised(self):
         """The first row of `gap_next_runs` as a mapping, None where the verdict is settled or nothing is advised."""
         table = self.found.tables["gap_next_runs"]
-        return table.iloc[0].to_dict() if len(table) and self.found.verdict["probability"] < SURE else None
+        return table.iloc[0].to_dict() if len(table) and not self.is_sure else None
+
+    @property
+    def is_sure(self):
+        """Whether each decision of the verdict is probable enough."""
+        return sureness(self.found) >= SURE
 
 
-def ambiguous(verdicts, most):
-    """Names of up to `most` robots of the check label, in order, with an uncertain verdict and rival causes.
+def answer(found):
+    """Probability by part of the verdict of a Diagnosis: a frozenset of a cause's name, or those of a group.
+
+    "unexplained" is a cause, and so is "none" where the verdict has no other.
+    """
+    decided, posterior = found.decided, found.inference.posterior
+    groups = {frozenset(group.names): group.probability for group in decided.groups}
+    single = [name for name in decided.effects if not decided.group_of(name)]
+    parts = groups | {frozenset([name]): posterior.marginal(name) for name in single}
+    if decided.unexplained:
+        parts[frozenset([UNEXPLAINED])] = posterior.probability_unexplained
+    return parts or {frozenset([NONE]): decided.probability}
+
+
+def sureness(found):
+    """Probability of the least sure decision of a Diagnosis on a single cause, or on a group, of 0 to 1."""
+    parts, posterior = answer(found), found.inference.posterior
+    others = {name: posterior.marginal(name) for name in found.inference.problem.effects}
+    others |= {UNEXPLAINED: posterior.probability_unexplained}
+    said = frozenset().union(*parts)
+    return float(min(*parts.values(), *(1.0 - p for name, p in others.items() if name not in said), 1.0))
+
+
+def names_the_truth(truth, parts):
+    """Whether each of some parts, as of `answer`, holds one true cause, and each true cause is in one of them.
+
+    Of a cause from outside "unexplained" is enough.
+    """
+    if is_outside(truth):
+        return frozenset([UNEXPLAINED]) in parts
+    causes = set(truth.split("+"))
+    return all(len(part & causes) == 1 for part in parts) and causes <= frozenset().union(*parts)
+
+
+def ambiguous(verdicts):
+    """Names of robots of the check label, in order, with an uncertain verdict and rival causes.
 
     verdicts: rows of `withheld_verdicts`. An advised run shows that there are rivals, even if none is probable enough
     to be named.
     """
     rivals = (verdicts["next_runs"] != "") | (verdicts["confounded_with"] != "")
     which = (verdicts["check"] == "label") & (verdicts["probability"] < SURE) & rivals
-    return verdicts.loc[which, "robot"].tolist()[:most]
+    return verdicts.loc[which, "robot"].tolist()
 
 
 def follow(robot, measurements, conditions, known, library):
-    """Rows of `withheld_advice` of one Robot, by round.
+    """Rows of `withheld_advice` of one Robot, by round; none where its verdict is sure.
 
     measurements: its table; known: its MeasuredRobot; library: GapSettings of the diagnosis.
     """
     before = Arm(measurements, (), diagnose(measurements, known, library, details=False))
+    if before.is_sure:
+        return []
     arms, points, result = dict.fromkeys(ARMS, before), 0, []
     first = before.advised
     before_columns = {
@@ -81,17 +126,17 @@ def follow(robot, measurements, conditions, known, library):
                 longer, runs = drive(robot, arms[name], run, conditions, generator)
                 arms[name] = Arm(longer, runs, diagnose(longer, known, library, details=False))
             row |= {f"{name}_run": run["run"] if run else "", **_verdict_columns(name, arms[name].found, robot)}
-            row[f"settled_{name}"] = row[f"right_{name}"] and row[f"probability_{name}"] >= SURE
+            row[f"settled_{name}"] = row[f"right_{name}"] and arms[name].is_sure
         result.append(row)
     return result
 
 
 def _verdict_columns(when, found, robot):
-    """Verdict, its probability and whether it is correct, as columns with the suffix `when`."""
+    """Verdict, probability of its least sure decision and whether it is correct, as columns with the suffix `when`."""
     return {
         f"verdict_{when}": found.verdict["effects"],
-        f"probability_{when}": found.verdict["probability"],
-        f"right_{when}": is_right(robot.truth, found.verdict["effects"], "label"),
+        f"probability_{when}": sureness(found),
+        f"right_{when}": names_the_truth(robot.truth, answer(found)),
     }
 
 
@@ -100,7 +145,7 @@ def random_run(arm, points, generator):
 
     None where the verdict of the Arm is settled.
     """
-    if arm.found.verdict["probability"] >= SURE:
+    if arm.is_sure:
         return None
     choice, _ = candidates(arm.measurements)
     off = [abs(run["points"] - points) if points else 0 for run in choice]

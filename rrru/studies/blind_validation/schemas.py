@@ -191,26 +191,28 @@ verdict                str    as in withheld_scores
 robots                 int    how many
 
 ## withheld_advice | tables/withheld_advice.parquet | robot round
-Ambiguous robots whose cause is hidden: the verdict is below 0.9 and has rivals. The same robot drives the first advised
-run with fresh noise; the run is added and diagnosed. This repeats until the verdict has 0.9 or nothing is advised. For
-comparison the same is done with a random run along trajectories of the nearest number of points.
+Ambiguous robots whose cause is hidden: the verdict has rivals, and a decision of it is below 0.9, be it that a cause or
+one of a group acts or that another does not. The same robot drives the first advised run with fresh noise; the run is
+added and diagnosed. This repeats until each decision has 0.9 or nothing is advised. For comparison the same is done
+with a random run along trajectories of the nearest number of points.
 --
 robot truth
 round                  int    times that runs were added, from 1 on
 kind                   str    what is advised at first, as in gap_next_runs; nothing: the verdict stays as it is {run,
     poses, nothing}
 verdict_before         str    verdict on the robot's own campaign
-probability_before     float  of this verdict, 0 to 1
-right_before           bool   whether it names exactly the truth, or unexplained where the library lacks that
+probability_before     float  of its least sure decision on a single cause or a group, 0 to 1
+right_before           bool   whether each cause or group holds one true cause, and all true ones are among them; or
+    unexplained where the library lacks the truth
 gain_nats              float? of this round's advised run, as in gap_next_runs; null where there is none
 advised_run            str    the advised run in words; empty where nothing is advised or the verdict is settled
 verdict_advised        str    verdict with all advised runs so far
-probability_advised    float  of this verdict, 0 to 1
+probability_advised    float  as probability_before
 right_advised          bool   as right_before
-settled_advised        bool   the verdict then is right, and with a probability of 0.9 or more
+settled_advised        bool   the verdict then is right, and each of its decisions has 0.9 or more
 random_run             str    the random run in words; empty where the verdict is settled
 verdict_random         str    verdict with all random runs so far
-probability_random     float  of this verdict, 0 to 1
+probability_random     float  as probability_before
 right_random           bool   as right_before
 settled_random         bool   as settled_advised
 

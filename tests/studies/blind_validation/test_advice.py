@@ -1,6 +1,7 @@
 """Following advice: what is driven is what was advised, by the same robot, and the count of what is settled."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -10,11 +11,16 @@ from rrru.campaign import measurements as rows
 from rrru.diagnosis.design.advise import candidates
 from rrru.diagnosis.design.poses import passes, points_of
 from rrru.diagnosis.diagnose import Diagnosis, MeasuredRobot
+from rrru.diagnosis.hypothesis import Hypothesis
 from rrru.diagnosis.options import OPTIONS
+from rrru.diagnosis.posterior import Posterior
 from rrru.diagnosis.settings import GapSettings
+from rrru.diagnosis.terms import EffectTerm
+from rrru.diagnosis.verdict import decide
 from rrru.robots.catalogue import make_mechanism
 from rrru.studies.blind_validation import advice
 from rrru.studies.blind_validation.robots import noise_free
+from tests.diagnosis.campaigns import EFFECTS
 from tests.schemas import check
 from tests.studies.blind_validation.conditions import CONDITIONS, acting, bare
 
@@ -26,10 +32,22 @@ def robot():
     return replace(plain, acting=(acting(plain, "drive_compliance"),))
 
 
+def _found(entries, tables=None):
+    """A made-up Diagnosis by (effects, probability, unexplained) of hypotheses."""
+    hypotheses = tuple(
+        Hypothesis(tuple(map(EffectTerm, names)), np.zeros(2), np.ones((2, 1))) for names, _, _ in entries
+    )
+    weights = np.array([[0.0, p] if flag else [p, 0.0] for _, p, flag in entries])
+    posterior = Posterior(hypotheses, np.log(np.maximum(weights, 1e-300)), np.tile([False, True], (len(entries), 1)))
+    inference = SimpleNamespace(posterior=posterior, problem=SimpleNamespace(effects=EFFECTS))
+    return Diagnosis({}, tables or {}, None, inference, decide(posterior, EFFECTS))
+
+
 def _arm(measurements, probability=0.5, runs=(), poses=None):
-    """An Arm of a made-up diagnosis."""
+    """An Arm of a made-up diagnosis, which names backlash or leaves open whether nothing acts."""
     tables = {"gap_next_runs": pd.DataFrame(runs), "gap_next_poses": pd.DataFrame(poses or {})}
-    return advice.Arm(measurements, (), Diagnosis({"probability": probability}, tables, None, None, None))
+    found = _found([(("backlash",), probability, False), ((), 1.0 - probability, False)], tables)
+    return advice.Arm(measurements, (), found)
 
 
 def test_every_candidate_is_driven_as_it_was_planned(robot):
@@ -95,7 +113,46 @@ def test_what_is_unsure_beside_rivals_is_ambiguous():
         ("label", "advised", 0.5, "", "line_1"),
     ]
     verdicts = pd.DataFrame(verdict_rows, columns=["check", "robot", "probability", "confounded_with", "next_runs"])
-    assert advice.ambiguous(verdicts, 20) == ["rival", "advised"] and advice.ambiguous(verdicts, 1) == ["rival"]
+    assert advice.ambiguous(verdicts) == ["rival", "advised"]
+
+
+_PAIR = [
+    (("backlash", "servo_lag"), 0.5, False),
+    (("backlash", "axis_tilt"), 0.45, False),
+    (("backlash",), 0.05, False),
+]
+
+
+@pytest.mark.parametrize(
+    ("entries", "sure", "truths"),
+    [
+        # a cause is sure, whatever small ones may act as well
+        (
+            [(("backlash",), 0.7, False), *(((("backlash", name), 0.1, False)) for name in list(EFFECTS)[-3:])],
+            0.9,
+            "backlash",
+        ),
+        # a group is one decision
+        (_PAIR, 0.95, "backlash+servo_lag"),
+        (_PAIR, 0.95, "axis_tilt+backlash"),
+        ([((), 0.97, False), (("backlash",), 0.03, False)], 0.97, "none"),
+        ([((), 0.98, True), (("backlash",), 0.02, True)], 0.98, "outside:cable_pull"),
+        # what is left open is a decision, too
+        ([(("backlash",), 0.7, False), (("backlash", "servo_lag"), 0.3, False)], 0.7, "backlash"),
+    ],
+)
+def test_a_verdict_is_as_sure_as_its_least_sure_decision(entries, sure, truths):
+    found = _found(entries)
+    assert advice.sureness(found) == pytest.approx(sure)
+    assert advice.names_the_truth(truths, advice.answer(found))
+    assert not advice.names_the_truth("thermal_growth", advice.answer(found))
+
+
+def test_a_verdict_without_a_true_cause_or_with_a_false_one_is_wrong():
+    parts = {frozenset(["backlash"]): 1.0, frozenset(["servo_lag", "axis_tilt"]): 1.0}
+    assert advice.names_the_truth("backlash+servo_lag", parts)
+    wrong = ("backlash", "servo_lag", "backlash+thermal_growth", "axis_tilt+backlash+servo_lag", "none", "outside:bump")
+    assert not any(advice.names_the_truth(truth, parts) for truth in wrong)
 
 
 def test_advice_is_followed_and_counted(robot, monkeypatch):
