@@ -138,6 +138,10 @@ def guess_columns(cells: Cells, mechanism: Robot, given: Mapping[str, str]) -> d
     open_names = [name for name in ours if name not in cells.names and name not in cells.means]
     pairs = [(_alike(one, theirs), one, theirs) for one in open_names for theirs in free]
     pairs = [pair for pair in pairs if pair[1] not in _COUNTS or _is_count(cells.cells[pair[2]][0])]
+    if _measured_by_an_instrument(free):
+        # X, Y, Z next to an instrument's columns are the slides of a machine that names them so
+        drives = {_plain(column) for column in mechanism.parts.columns}
+        pairs = [pair for pair in pairs if pair[1] not in MEASURED or _plain(pair[2]) not in drives]
     found: dict[str, str] = {}
     for likeness, one, theirs in sorted(pairs, key=lambda pair: -pair[0]):
         if likeness >= _LEAST_ALIKE and one not in found and theirs not in found.values():
@@ -202,8 +206,12 @@ def _numbered(drives: Sequence[Drive], found: Mapping[str, str], free: Iterable[
 
 
 def _is_count(cell: Cell) -> bool:
-    """Whether a cell holds a whole number."""
-    return isinstance(cell, (int, float)) or str(cell).strip().isdigit()
+    """Whether a cell holds a whole number from 1 on."""
+    try:
+        number = float(str(cell))
+    except ValueError:
+        return False
+    return number >= 1.0 and number.is_integer()
 
 
 def guess_clock(cells: Cells, theirs: str) -> str | None:
@@ -242,7 +250,7 @@ def _words(ours: str) -> tuple[str, ...]:
 def _plain(name: str) -> str:
     """A name in small letters without units and signs."""
     bare = re.sub(r"[\[(][^\])]*[\])]", " ", name.lower())
-    bare = re.sub(r"_(mm|m|s|rad|deg|kg|c|mm_s)$", "", bare.strip())
+    bare = re.sub(r"(_(mm|m|s|rad|deg|kg|c|mm_s)| (mm|deg|rad|kg))$", "", bare.strip())
     return " ".join(re.sub(r"[^a-z0-9]+", " ", bare).split())
 
 

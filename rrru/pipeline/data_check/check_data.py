@@ -210,8 +210,11 @@ def print_check(
     own = {name: config["robots"][name]} if own_robot(config["robots"][name]) and not overlays else {}
     print(_pasted(found, own))
     if not found.refused:
-        files = " ".join([*map(str, overlays), "mine.yaml"])
-        print(f"# saved as mine.yaml: rrru diagnose {found.name} --config {files}")
+        # no file of the configuration, which it would replace
+        stated = [str(overlay) for overlay in overlays]
+        new = next(name for name in ("mine.yaml", f"{found.name}.yaml", "proposed.yaml") if name not in stated)
+        files = " ".join([*stated, new])
+        print(f"# saved as {new}: rrru diagnose {found.name} --config {files}")
         if not overlays and (command := as_command(found.section, config["robots"][name])):
             print(f"# or without a file: {command}")
     elif not overlays and (options := options_in("\n".join(str(IngestError([one])) for one in found.refused))):

@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 
 from rrru.campaign import measurements as rows
-from rrru.campaign.driven_path import passes_points
+from rrru.campaign.driven_path import passes_points, stops
 from rrru.campaign.noise import ENOUGH_REPEATS, read_noise, repeat_noise
 from rrru.diagnosis.determined import poses_needed, require_determined
 from rrru.diagnosis.diagnose import with_wide_bounds
@@ -126,9 +126,11 @@ def _one_way(problem: DiagnosisProblem, columns: Iterable[str]) -> Iterator[str]
 def _passes(measurements: pd.DataFrame, section: Mapping[str, Any]) -> Iterator[str]:
     """Sentences on missing repetitions: places at other times, noise, payloads."""
     command = measurements[["command_x_mm", "command_y_mm", "command_z_mm"]].round(3)
-    runs = measurements["run"].groupby([*command.to_numpy().T]).nunique()
-    if not (runs > 1).any():
-        yield "no place is measured in two runs: drift is confounded with effects of the place; repeat a run"
+    follows_path = passes_points(measurements)
+    visits = measurements["run"] if follows_path else pd.Series(stops(measurements), index=measurements.index)
+    if not (visits.groupby([*command.to_numpy().T]).nunique() > 1).any():
+        missing, remedy = ("in two runs", "repeat a run") if follows_path else ("twice", "return to some stops later")
+        yield f"no place is measured {missing}: drift is confounded with effects of the place; {remedy}"
     stated = "noise_mm" in section or read_noise(measurements) is not None
     if not stated and (freedom := repeat_noise(measurements)[1]) < ENOUGH_REPEATS:
         yield _estimated_noise(measurements, freedom // 3)

@@ -16,7 +16,7 @@ from rrru.campaign.ingest.campaign_file import ingest
 from rrru.campaign.ingest.spec import IngestSpec
 from rrru.pipeline import config as parts
 from rrru.pipeline import setup
-from rrru.pipeline.data_check.check_data import check_file
+from rrru.pipeline.data_check.check_data import check_file, print_check
 from rrru.pipeline.read_config import read_config
 from rrru.robots.rrru3 import Rrru3
 from tests.campaign.ingest.samples import SAMPLES, section
@@ -201,6 +201,19 @@ def test_missing_repetitions_and_payloads_are_reported(tmp_path):
     assert any(one.startswith("always approached from one side") and all(name in one for name in same) for one in said)
 
 
+def test_stops_that_are_driven_to_again_are_places_measured_twice(tmp_path):
+    """Stops in no order in one run; those that return were said to be missing, with a run to repeat."""
+    random = np.random.default_rng(3)
+    some = FIELD.iloc[random.permutation(len(FIELD))[:60]].drop(columns=["run", "point", "trajectory", "time_s"])
+    some = some.drop_duplicates(subset=["command_x_mm", "command_y_mm", "command_z_mm"])
+    again = pd.concat([some, some.iloc[:5]])
+    for frame, missing in ((some, True), (again, False)):
+        section = {"robot": "rrru3", "ingest": str(tmp_path / "mine.csv"), "motion": "stop_and_go", "noise_mm": 0.02}
+        said = costs(checked(frame, tmp_path, campaigns={"a": section}))
+        assert any("return to some stops later" in one for one in said) is missing
+        assert not any("in two runs" in one for one in said)
+
+
 def test_too_few_points_for_a_diagnosis_are_reported(tmp_path):
     assert costs(checked(FIELD.head(8), tmp_path))[0].startswith("no diagnosis: ")
 
@@ -246,6 +259,13 @@ def test_the_command_prints_an_overlay(tmp_path, monkeypatch, capsys):
     )
     assert filled["campaigns"]["field_12"].keys() == {"robot", "ingest", "noise_mm", "platform_mass_kg"}
     jsonschema.validate(filled["campaigns"], SCHEMA["properties"]["campaigns"] | {"$defs": SCHEMA["$defs"]})
+
+
+def test_the_overlay_to_save_replaces_none_that_is_given(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    FIELD.head(60).to_csv("run.csv", index=False)
+    print_check("run.csv", CONFIG, "rrru3", overlays=["mine.yaml"])
+    assert "# saved as run.yaml: rrru diagnose run --config mine.yaml run.yaml" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("stem", ["123", "no", "a b: c", "1e5"])
