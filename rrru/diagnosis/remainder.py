@@ -15,7 +15,7 @@ from rrru.cache import cached_on
 from rrru.diagnosis.heldout import within
 from rrru.diagnosis.inference import InferenceResult
 from rrru.diagnosis.options import OPTIONS
-from rrru.diagnosis.smooth_functions import TIME, Regression, Variable, process, variables
+from rrru.diagnosis.smooth_functions import TIME, Regression, Variable, couplings, process, variables
 from rrru.diagnosis.state import LeftByCalibration, LinearizedProblem
 from rrru.effects.protocol import Effect
 
@@ -101,7 +101,8 @@ def _depends_on(effect: Effect, follows: str) -> bool:
 
 def _variables(inference: InferenceResult, rows: BoolArray) -> list[Variable]:
     """The variables that the remainder may follow at some rows (m,)."""
-    return variables(inference.problem, inference.state, inference.evidence.linear.drive, rows)
+    problem, drive = inference.problem, inference.evidence.linear.drive
+    return [*variables(problem, inference.state, drive, rows), *couplings(problem, drive, rows)]
 
 
 def _predicted(

@@ -132,7 +132,8 @@ def _ranges(names: Sequence[str], chosen: Collection[str]) -> list[str]:
 
 
 def acting_places(numbers: Sequence[Facts]) -> list[str]:
-    """Places of an effect at which one of its numbers is not zero by its 95 % interval; all where there is none.
+    """Places of an effect at which one of its numbers is not zero by its 95 % interval; where there is none, those at
+    which one was fitted, else all.
 
     numbers: its rows of `gap_parameters`. Of n numbers of one place each has an interval of 1 - 0.05 / n (Bonferroni),
     so that chance alone names one place in twenty. The phase of a wave says nothing: no amplitude has the phase zero.
@@ -141,7 +142,9 @@ def acting_places(numbers: Sequence[Facts]) -> list[str]:
     for number in numbers:
         if number["place"] and not is_phase(number["parameter"]):
             by_place.setdefault(number["place"], []).append(number)
-    return [place for place, its in by_place.items() if any(_is_not_zero(one, len(its)) for one in its)] or [*by_place]
+    acting = [place for place, its in by_place.items() if any(_is_not_zero(one, len(its)) for one in its)]
+    fitted = [place for place, its in by_place.items() if not all(np.isnan(one["low_95"]) for one in its)]
+    return acting or fitted or [*by_place]
 
 
 def is_off_zero(number: Facts) -> bool:

@@ -147,8 +147,9 @@ What the unexplained part of a gap looks like: how well a function of one variab
 unexplained.
 --
 campaign
-follows                str    the variable: the value of a drive, the place, the time, also as a zero offset of a drive
-    or as a shift of a target on the platform, the payload, the speed, the sense of motion of the drives
+follows                str    the variable: the value of a drive, also as an error of another one, the place, the time,
+    also as a zero offset of a drive or as a shift of a target on the platform, the payload, the speed, the sense of
+    motion of the drives
 explained              float  share of its mean square that such a function predicts at left-out points, 0 to 1
 scale                  float? distance over which the function changes; null for steps
 unit                   str    of the variable

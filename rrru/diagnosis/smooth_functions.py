@@ -1,14 +1,15 @@
 """Functions of one variable that an error may follow: a drive's value, the time, the place, the load, the motion.
 
 A function f of a drive's value, or of the time, is added to the drive and moves the positions by J f (J: derivative by
-the drive). Or it is a function of the place, the time, the payload or the speed for each axis, of the time for each
-axis of the platform and one target, or steps with the sense of motion of the drives. A function is a Gaussian process
-of covariance a^2 exp(-d^2 / (2 l^2)) of the distance d, by its values at inducing points (C. Rasmussen and C. Williams,
-Gaussian Processes for Machine Learning, 2006, sec. 8.3).
+the drive). So is a function of another drive's value: two drives are coupled. Or it is a function of the place, the
+time, the payload or the speed for each axis, of the time for each axis of the platform and one target, or steps with
+the sense of motion of the drives. A function is a Gaussian process of covariance a^2 exp(-d^2 / (2 l^2)) of the
+distance d, by its values at inducing points (C. Rasmussen and C. Williams, Gaussian Processes for Machine
+Learning, 2006, sec. 8.3).
 """
 
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.linalg import solve_triangular
@@ -56,13 +57,8 @@ def variables(problem: DiagnosisProblem, state: ModelState, drive: FloatArray, r
     drive (m, 3, K): derivative of the rows by the drives at the state.
     """
     drive, motion, at = drive[rows], problem.motion, problem.at[rows]
-    words, units = drive_words(problem.mechanism), problem.mechanism.parts.units
-    names = words.all_names
-    responses = [_of_unit_size(drive[:, :, k : k + 1]) for k in range(len(units))]
-    found = [
-        Variable(f"the value of {name}", motion.drive[at, k : k + 1], unit, response, kind=OF_DRIVES)
-        for k, (name, unit, response) in enumerate(zip(names, units, responses, strict=False))
-    ]
+    names, responses = drive_words(problem.mechanism).all_names, _drive_responses(drive)
+    found = _values(problem, rows, responses)
     time_s = motion.time_s[at][:, None]
     found += [
         Variable(f"{TIME}, as a zero offset of {name}", time_s, "s", response, kind=OF_ZEROS)
@@ -79,6 +75,37 @@ def variables(problem: DiagnosisProblem, state: ModelState, drive: FloatArray, r
     found.append(Variable("the speed", speed[:, None], "mm/s"))
     sense = np.sign(np.where(np.abs(motion.drive_rate[at]) > OPTIONS.min_drive_rate, motion.drive_rate[at], 0.0))
     found.append(Variable("the sense of motion of the drives", sense, "1", drive, steps=True))
+    return _changing(found)
+
+
+def couplings(problem: DiagnosisProblem, drive: FloatArray, rows: BoolArray) -> list[Variable]:
+    """The values of drives at some rows (m,) of a problem, each as what another drive errs by; as `variables`."""
+    names, responses = drive_words(problem.mechanism).all_names, _drive_responses(drive[rows])
+    return [
+        replace(own, follows=f"{own.follows}, as an error of {name}", response=response)
+        for own in _changing(_values(problem, rows, responses))
+        for name, response in zip(names, responses, strict=False)
+        if response is not own.response and response.any()
+    ]
+
+
+def _values(problem: DiagnosisProblem, rows: BoolArray, responses: list[FloatArray]) -> list[Variable]:
+    """The value of each drive at some rows (m,) as what its own error follows, with responses (m, 3, 1)."""
+    value, words = problem.motion.drive[problem.at[rows]], drive_words(problem.mechanism)
+    parts = zip(words.all_names, problem.mechanism.parts.units, responses, strict=False)
+    return [
+        Variable(f"the value of {name}", value[:, k : k + 1], unit, response, kind=OF_DRIVES)
+        for k, (name, unit, response) in enumerate(parts)
+    ]
+
+
+def _drive_responses(drive: FloatArray) -> list[FloatArray]:
+    """Of each drive the response (m, 3, 1) of unit size of the positions; drive (m, 3, K): their derivative."""
+    return [_of_unit_size(drive[:, :, k : k + 1]) for k in range(drive.shape[2])]
+
+
+def _changing(found: Iterable[Variable]) -> list[Variable]:
+    """Those of some variables that are known and change."""
     return [one for one in found if np.isfinite(one.value).all() and np.ptp(one.value, axis=0).max() > 0.0]
 
 

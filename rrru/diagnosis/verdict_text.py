@@ -368,9 +368,10 @@ def _common(facts: Facts) -> list[str]:
 
 
 def _overlap(facts: Facts) -> bool:
-    """Whether shares of several parts add up to more than the whole by more than is mentioned."""
-    shares = [effect["share"] or 0.0 for effect in facts["effects"]]
-    shares += [part["share"] for part in facts["budget"] if part["kind"] == "unexplained" and facts["unexplained"]]
+    """Whether shares of several parts that are stated add up to more than the whole by more than is mentioned."""
+    parts = [effect for effect in facts["effects"] if effect["share"] is not None]
+    parts += [part for part in facts["budget"] if part["kind"] == "unexplained" and facts["unexplained"]]
+    shares = [part["share"] for part in parts if is_determined(part)]
     return len(shares) > 1 and sum(shares) > 1.0 + OPTIONS.min_mentioned_share
 
 

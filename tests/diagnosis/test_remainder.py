@@ -67,6 +67,9 @@ def _attribution(make, seed=0, count=240, calibration=_offsets):
 
 _MADE = {
     "the value of leg 2": lambda motion, response: response[:, :, 1] * (4e-4 * np.sin(9.0 * motion.drive[:, 1:2])),
+    "the value of leg 3, as an error of leg 1": lambda motion, response: (
+        response[:, :, 0] * (4e-4 * np.sin(9.0 * motion.drive[:, 2:3]))
+    ),
     "the time": lambda motion, _: 0.1 * np.sin(motion.time_s / 60.0)[:, None] * [1.0, -0.5, 0.2],
     "the place": lambda motion, _: 0.1 * np.cos(np.linalg.norm(motion.position_mm - 100.0, axis=1) / 60.0)[:, None],
     "the sense of motion of the drives": lambda motion, response: np.einsum(

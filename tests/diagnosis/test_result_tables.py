@@ -82,3 +82,12 @@ def test_the_table_names_the_sites_at_which_an_effect_is_not_zero():
     found = diagnose(frame, known, GapSettings(("backlash",), draws=10), details=False)
     assert found.verdict["effects"] == "backlash" and found.verdict["leg"] == 0
     assert found.verdict["where"] == "leg 1 drive, leg 3 drive"
+
+
+def test_where_no_place_is_sure_those_that_were_not_fitted_are_none():
+    """Growth of one slide whose interval holds zero, next to a slide without growth: "at X, Z" was said."""
+    numbers = [
+        {"parameter": "strain1", "place": "at X", "value": 5e-5, "low_95": 0.0, "high_95": 1.4e-4},
+        {"parameter": "strain3", "place": "at Z", "value": 0.0, "low_95": np.nan, "high_95": np.nan},
+    ]
+    assert acting_places(numbers) == ["at X"] and acting_places(numbers[1:]) == ["at Z"]

@@ -170,6 +170,15 @@ def test_shares_overlap_only_where_there_are_several(shares, unexplained, overla
     assert ("and of what is unexplained cancel" in said) == (overlap and unexplained is not None)
 
 
+def test_shares_that_are_not_stated_do_not_add_up():
+    """ "An undetermined share" and "another undetermined share" were said to add up to more than the gap."""
+    budget = synthetic_gap.gap_budget(CAMPAIGN)
+    for name, share in (("link_flexure", 0.2), ("backlash", 0.0), ("unexplained", 9600.0)):
+        budget.loc[budget["part"] == name, ["share", "share_low", "share_high"]] = share, 0.0, 10.0 * share + 1.0
+    said = " ".join(answered(budget=budget, effects="link_flexure+unexplained")["sentences"])
+    assert said.lower().count("undetermined share") == 2 and "These shares" not in said
+
+
 @pytest.mark.parametrize(
     ("share", "effects", "said"),
     [(0.3, "link_flexure+backlash", True), (0.04, "link_flexure+backlash", False), (0.3, "link_flexure", False)],
