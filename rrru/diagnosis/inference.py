@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 from scipy.special import chdtri
 
-from rrru.arrays import FloatArray
+from rrru.arrays import BoolArray, FloatArray
 from rrru.campaign import noise
 from rrru.campaign.outliers import isolated
 from rrru.diagnosis.aliases import EffectKey
@@ -26,6 +26,7 @@ from rrru.diagnosis.problem import DiagnosisProblem
 from rrru.diagnosis.settings import Prior
 from rrru.diagnosis.state import LinearizedProblem, ModelState
 from rrru.diagnosis.terms import EffectTerm, each_leg, shape_probabilities
+from rrru.diagnosis.unsupported import unsupported
 from rrru.diagnosis.whitened import DISCREPANCY_SCALES, spectrum
 from rrru.effects.library import HOLDS
 from rrru.effects.protocol import Coordinates
@@ -326,12 +327,26 @@ def infer(problem: DiagnosisProblem, prior: Prior, stated: str = KNOWN) -> Infer
         inference = _rounds(problem, calibrated, prior, stated)
         if stated != KNOWN:
             inference = _with_hidden_offsets(inference, prior, problem.noise_mm if stated == STATED else None)
-        found = inference.problem
-        outliers = isolated(found.residual(inference.state), found.series, found.noise_mm, found.kind)
+        outliers = _outliers(inference)
         if cleaning == OPTIONS.max_outlier_rounds or not outliers.any():
             break
         problem = problem.without(outliers)
     return replace(inference, dropped=total - problem.count)
+
+
+def _outliers(inference: InferenceResult) -> BoolArray:
+    """Rows (m,) that stand alone under an inference, or are explained by an effect that they alone support."""
+    problem, effects = inference.problem, inference.hypothesis.effects
+    found = isolated(problem.residual(inference.state), problem.series, problem.noise_mm, problem.kind)
+    broad = {name for name in effects - set(UNKNOWN) if problem.library[name].coordinates.broad}
+    if found.any() or not broad:
+        return found
+    apart = with_effects(inference, effects - broad)
+    residual = apart.problem.residual(apart.state)
+    found = isolated(residual, problem.series, problem.noise_mm, problem.kind)
+    fitted = np.isin(problem.at, inference.fit.model.problem.at)
+    found[fitted] = unsupported(inference.fit, found[fitted], residual[fitted])
+    return found & fitted
 
 
 def with_effects(inference: InferenceResult, effects: Collection[str]) -> InferenceResult:

@@ -171,7 +171,7 @@ def test_shares_overlap_only_where_there_are_several(shares, unexplained, overla
 
 
 def test_shares_that_are_not_stated_do_not_add_up():
-    """ "An undetermined share" and "another undetermined share" were said to add up to more than the gap."""
+    """Of "an undetermined share" and "another undetermined share" it was said that they add up to more than the gap."""
     budget = synthetic_gap.gap_budget(CAMPAIGN)
     for name, share in (("link_flexure", 0.2), ("backlash", 0.0), ("unexplained", 9600.0)):
         budget.loc[budget["part"] == name, ["share", "share_low", "share_high"]] = share, 0.0, 10.0 * share + 1.0
