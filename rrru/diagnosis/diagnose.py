@@ -43,7 +43,7 @@ from rrru.diagnosis.result_notes import (
     undetermined_payload_notes,
     zero_notes,
 )
-from rrru.diagnosis.result_tables import details_of, left_out, left_out_note, parameter_rows, where
+from rrru.diagnosis.result_tables import details_of, left_out, left_out_note, outlier_note, parameter_rows, where
 from rrru.diagnosis.settings import GapSettings, Prior
 from rrru.diagnosis.shrink import CLOSED, ShrinkStep, losses_without, order_by_share, share_closed, shrink_steps
 from rrru.diagnosis.state import ModelState
@@ -161,8 +161,8 @@ def diagnose(
     begin(STEPS[4])
     worst = worst_spot(problem.motion.position_mm[problem.at][problem.on_robot], residual[problem.on_robot])
     excluded = left_out(problem, near)
-    numbers = parameter_rows(inference)
-    row = _row(inference, verdict, steps, worst, further, (robot.noise_mm, excluded, numbers))
+    numbers, outliers = parameter_rows(inference), outlier_note(problem, near)
+    row = _row(inference, verdict, steps, worst, further, (robot.noise_mm, (excluded, outliers), numbers))
     ranked = further.runs.assign(rank=np.arange(1, len(further.runs) + 1))
     tables = {"gap_budget": parts, "gap_next_runs": ranked, "gap_next_poses": further.poses, "gap_left_out": excluded}
     tables["gap_parameters"] = numbers
@@ -196,13 +196,18 @@ def _findings(inference: InferenceResult) -> Iterator[str]:
     yield from undetermined_payload_notes(inference)
 
 
-def _notes(inference: InferenceResult, stated_mm: float | None, excluded: pd.DataFrame) -> Iterator[str]:
-    """What the data lack for a better answer, and what they contradict; excluded: the rows of `gap_left_out`."""
+def _notes(inference: InferenceResult, stated_mm: float | None, excluded: pd.DataFrame, outliers: str) -> Iterator[str]:
+    """What the data lack for a better answer, and what they contradict.
+
+    excluded: the rows of `gap_left_out`; outliers: a sentence on those to the diagnosis, empty where there are none.
+    """
     problem = inference.problem
     yield from fit_notes(inference)
     yield from posterior_notes(inference.posterior)
     if problem.count < OPTIONS.min_used_share * len(problem.used):
         yield left_out_note(excluded, problem.count, len(problem.used))
+    if outliers:
+        yield outliers
     if few := few_readings(problem):
         yield few
     acting = {name for name, _ in inference.state.effects} & problem.known.keys()
@@ -228,12 +233,12 @@ def _row(
     steps: Sequence[ShrinkStep],
     worst_mm: FloatArray,
     further: Advice,
-    about: tuple[float | None, pd.DataFrame, pd.DataFrame],
+    about: tuple[float | None, tuple[pd.DataFrame, str], pd.DataFrame],
 ) -> Row:
     """The row of `gap_verdicts` without the campaign.
 
-    worst_mm (3,): where the residual is largest; about: the stated noise in mm, the rows of `gap_left_out` and those of
-    `gap_parameters`. Columns of a corrected file are filled where one is written.
+    worst_mm (3,): where the residual is largest; about: the stated noise in mm, `gap_left_out` and its outliers
+    in words, and `gap_parameters`. Columns of a corrected file are filled where one is written.
     """
     stated_mm, excluded, numbers = about
     found = [] if verdict.no_answer else _findings(inference)
@@ -260,7 +265,7 @@ def _row(
         "noise_from": inference.noise_from,
         "points": problem.count,
         "dropped_points": inference.dropped,
-        "notes": _joined([*found, *_notes(inference, stated_mm, excluded), *filter(None, [further.limited])]),
+        "notes": _joined([*found, *_notes(inference, stated_mm, *excluded), *filter(None, [further.limited])]),
         "not_in_model": "",
         "no_answer": verdict.no_answer,
         "file_error_mm": np.nan,

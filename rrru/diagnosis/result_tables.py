@@ -44,6 +44,8 @@ REASONS = (
     "near a singularity",
     "outlier to the diagnosis",
 )
+# runs whose outliers are named in a sentence
+_MAX_NAMED = 8
 _STATUS = {
     "stale": "stale reading",
     "outlier": "outlier in the file",
@@ -357,6 +359,21 @@ def left_out_note(table: pd.DataFrame, used: int, whole: int) -> str:
     """A sentence on a table of `left_out`."""
     counts = ", ".join(f"{points} {reason}" for reason, points in table.itertuples(index=False))
     return f"{used} of {whole} points used; left out: {counts}"
+
+
+def outlier_note(problem: DiagnosisProblem, use_near_singularity: bool) -> str:
+    """A sentence that names the points which the diagnosis left out as outliers; empty where there are none."""
+    dropped = ~problem.used & (_reasons(problem, use_near_singularity) == REASONS[-1])
+    places = problem.measurements.loc[dropped, ["trajectory", "run", "point"]]
+    if places.empty:
+        return ""
+    named = [
+        f"{trajectory} (run {run}): point {', '.join(map(str, its))}"
+        for (trajectory, run), its in places.groupby(["trajectory", "run"], sort=False)["point"]
+    ]
+    more = f", and more in {len(named) - _MAX_NAMED} runs" if len(named) > _MAX_NAMED else ""
+    check = "see these rows, and whether a stop before them is not in the file"
+    return f"outliers to the diagnosis: {', '.join(named[:_MAX_NAMED])}{more}, {check}"
 
 
 def _reasons(problem: DiagnosisProblem, use_near_singularity: bool) -> ObjectArray:

@@ -47,4 +47,7 @@ def test_one_stop_that_was_reached_from_the_other_side_is_no_function_of_the_dri
     points = found.tables["gap_points"]
     left = points.index[~points["used"]]
     assert table.index[left].tolist() == wrong
+    rows = ", ".join(map(str, points.loc[left, "point"]))
+    said = f"outliers to the diagnosis: stops (run 1): point {rows}, see these rows"
+    assert any(note.startswith(said) for note in found.verdict["notes"])
     assert found.verdict["gap_after_rms_mm"] < numpy_arm.NOISE_MM

@@ -273,6 +273,7 @@ _ALWAYS = {"no commanded positions": True, "the robot repeats": True} | dict.fro
             "the noise is smaller",
             "a noise of zero was stated",
             "far from ordinary errors",
+            "outliers are named",
             "points are outliers",
             "stale readings",
         ),

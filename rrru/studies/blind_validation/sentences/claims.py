@@ -99,6 +99,7 @@ _NOTES = {
     "a weight is confounded": r"(?:a mass at the platform|a tilt of the base about \w) and a compliance are not .*",
     "the fit did not converge": r"the fit of .* did not converge.*",
     "points used": r"(?P<used>\d+) of (?P<rows>\d+) points used(?:, .*)?",
+    "outliers are named": r"outliers to the diagnosis: .*",
     "few readings": r"few readings: (?P<numbers>\d+) numbers for (?P<parameters>\d+) parameters .*",
     "fitted without some points": r"(?P<names>[\w, ]+) fitted without (?P<lacking>\d+) of (?P<used>\d+) points, .*",
     "the noise is larger": rf"noise stated {_X} mm per axis, found {_Y}: the (?:robot|instrument is worse).*",

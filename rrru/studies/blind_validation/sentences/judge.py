@@ -455,6 +455,7 @@ _OF_EVERY_FILE = {"no commanded positions": True, "the robot repeats": True} | d
         "the noise is smaller",
         "a noise of zero was stated",
         "far from ordinary errors",
+        "outliers are named",
         "points are outliers",
         "stale readings",
         "undeclared columns",
