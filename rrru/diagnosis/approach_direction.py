@@ -23,7 +23,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from rrru.arrays import BoolArray, FloatArray, IntArray
-from rrru.campaign.driven_path import STEPS
+from rrru.campaign.driven_path import STEPS, stops
 from rrru.campaign.outliers import NORMAL_MEDIAN
 from rrru.campaign.stated_motion import DRIVES, TOOL
 from rrru.diagnosis.discrepancy_basis import TestedEffect
@@ -137,7 +137,8 @@ def estimate_approach(problem: DiagnosisProblem, state: ModelState, responses: F
     """The motion's `approach` (n, K), its unknown senses (finite values) replaced by their posterior means in -1..1.
 
     Both senses of every drive have equal prior probability. The combinations of the senses at a stop have posterior
-    probabilities in proportion to the likelihood of all that was read there, with the residuals of a state.
+    probabilities in proportion to the likelihood of all that was read there, with the residuals of a state. At the
+    first stop of a run the drives may as well, with a probability of one half, be somewhere between both sides.
     responses (m, 3, K): change in mm of what is read by a sense of 1 of each drive.
     """
     approach = np.array(problem.motion.approach)
@@ -149,18 +150,36 @@ def estimate_approach(problem: DiagnosisProblem, state: ModelState, responses: F
     size = np.sqrt((response**2).sum(axis=1)) > OPTIONS.min_approach_response_per_noise
     approach[unknown] = 0.0
     acting = (unknown[problem.at] & size).any(axis=1)
+    run = problem.measurements["run"].to_numpy()
+    first_stops = stops(problem.measurements)[np.concatenate([[True], run[1:] != run[:-1]])]
     for stop in np.unique(problem.stop[acting]):
         here = problem.stop == stop
         drives = np.flatnonzero((unknown[problem.at[here]] & size[here]).any(axis=0))
         power = (response[here][..., drives] ** 2).sum(axis=(0, 1))
         drives = np.sort(drives[np.argsort(-power, kind="stable")][: OPTIONS.max_jointly_estimated_drives])
         senses = np.array([*product((-1.0, 1.0), repeat=len(drives))])
-        misfit = residual[here].ravel() - senses @ response[here].reshape(-1, response.shape[-1])[:, drives].T
+        by_sense = response[here].reshape(-1, response.shape[-1])[:, drives]
+        misfit = residual[here].ravel() - senses @ by_sense.T
         log_likelihood = -0.5 * (misfit**2).sum(axis=1)
+        if stop in first_stops:
+            between, log_between = _between_sides(residual[here].ravel(), by_sense)
+            senses = np.concatenate([senses, between[None]])
+            log_likelihood = np.append(log_likelihood - len(drives) * np.log(2.0), log_between)
         probability = np.exp(log_likelihood - np.logaddexp.reduce(log_likelihood))
         points = np.unique(problem.at[here])
         approach[points[:, None], drives] = np.where(unknown[points[:, None], drives], probability @ senses, np.nan)
     return approach
+
+
+def _between_sides(residual: FloatArray, by_sense: FloatArray) -> tuple[FloatArray, float]:
+    """Posterior means (d,) of senses that are somewhere in -1..1, and the log marginal likelihood of that.
+
+    residual (a,), by_sense (a, d): in units of the noise. The prior is normal with the variance 1/3 of even ones.
+    """
+    precision = by_sense.T @ by_sense + 3.0 * np.eye(by_sense.shape[1])
+    mean = np.linalg.solve(precision, by_sense.T @ residual)
+    log = 0.5 * (len(mean) * np.log(3.0) - np.linalg.slogdet(precision)[1] - residual @ (residual - by_sense @ mean))
+    return np.clip(mean, -1.0, 1.0), float(log)
 
 
 def has_direction(effect: TestedEffect) -> bool:
