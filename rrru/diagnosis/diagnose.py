@@ -1,6 +1,6 @@
 """The diagnosis of one campaign: problem, posterior of the causes, verdict, budget and what to measure next."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -188,10 +188,10 @@ def _with_drawn_jumps(
     return replace(last, moved_mm2=last.moved_mm2 + explained * (jumps - mean))
 
 
-def _findings(inference: InferenceResult) -> Iterator[str]:
-    """Notes on zero offsets, biased parameters and the payload, which are found in addition to the effects."""
+def _findings(inference: InferenceResult, named: Collection[str]) -> Iterator[str]:
+    """Notes on zero offsets, parameters biased by named effects and the payload, found in addition to the effects."""
     yield from zero_notes(inference.fit.stated, inference.problem.mechanism)
-    yield from bias_notes(inference)
+    yield from bias_notes(inference, named)
     yield from payload_notes(inference)
     yield from undetermined_payload_notes(inference)
 
@@ -241,7 +241,7 @@ def _row(
     in words, and `gap_parameters`. Columns of a corrected file are filled where one is written.
     """
     stated_mm, excluded, numbers = about
-    found = [] if verdict.no_answer else _findings(inference)
+    found = [] if verdict.no_answer else _findings(inference, verdict.effects)
     problem, noise = inference.problem, inference.problem.noise or NoiseModel.white(inference.problem.noise_mm)
     return {
         "effects": verdict.label,

@@ -2,7 +2,7 @@
 omitted-variable bias of a calibration without an effect of how the campaign was measured. Lengths mm, angles rad.
 """
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 
 import numpy as np
 from scipy.special import chdtri
@@ -256,9 +256,9 @@ def fit_notes(inference: InferenceResult) -> Iterator[str]:
         yield f"the fit of {names} did not converge ({end.message}): its values are preliminary"
 
 
-def bias_notes(inference: InferenceResult) -> tuple[str, ...]:
-    """Sentences on the bias that each effect of the corrected model would cause if it were omitted, such as "without
-    read_before_rest joint_1_x would be off by 7.1 standard errors: ..".
+def bias_notes(inference: InferenceResult, named: Collection[str]) -> tuple[str, ...]:
+    """Sentences on the bias that each named effect of the corrected model would cause if it were omitted, such as
+    "without read_before_rest joint_1_x would be off by 7.1 standard errors: ..".
 
     The biased parameters are those of the least-squares fit to the omitted effect. Each bias is in units of the
     standard error that a calibration without the effect would state. Parameters of the frame do not count.
@@ -273,8 +273,8 @@ def bias_notes(inference: InferenceResult) -> tuple[str, ...]:
     unexplained = (linear.data - sum(acting.values(), np.zeros(linear.data.shape))).ravel()
     notes = []
     for (name, _), change in acting.items():
-        # a discrepancy function is no effect of the library
-        if name in problem.effects and problem.effects[name].spoils:
+        # of an effect that is possible alone the sentence would say that it acts
+        if name in named and problem.effects[name].spoils:
             left = unexplained + change.ravel()
             left = left - flat @ (inverse @ left / size)
             noise = np.sqrt((left**2).sum() / max(len(left) - flat.shape[1], 1))

@@ -9,6 +9,7 @@ import pytest
 from rrru.campaign import measurements as rows
 from rrru.diagnosis.diagnose import MeasuredRobot, diagnose
 from rrru.diagnosis.make_problem import make_diagnosis_problem
+from rrru.diagnosis.result_notes import bias_notes
 from rrru.diagnosis.settings import GapSettings
 from rrru.effects.library import find
 from rrru.effects.motion import last_move
@@ -108,5 +109,7 @@ def test_the_diagnosis_names_it_and_not_backlash(exponent):
     found = diagnose(frame, robot, GapSettings(names, draws=10), details=False)
     assert found.verdict["effects"] == "read_before_rest"
     assert "would be off by" in found.verdict["notes"] and "before the arm stood still" in found.verdict["notes"]
+    # of an effect that is in the corrected model and not named nothing is said: it would be said that it acts
+    assert bias_notes(found.inference, ()) == ()
     values = next(iter(found.state.effects.values()))
     np.testing.assert_allclose(values, [*_SHARES.values()], atol=3e-4)
