@@ -22,11 +22,11 @@ from rrru.diagnosis.model_fit import EffectModel, ModelFit, fit_model
 from rrru.diagnosis.model_space import ModelSpace
 from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.posterior import Posterior
+from rrru.diagnosis.prediction_errors import prediction_errors
 from rrru.diagnosis.problem import DiagnosisProblem
 from rrru.diagnosis.settings import Prior
 from rrru.diagnosis.state import LinearizedProblem, ModelState
 from rrru.diagnosis.terms import EffectTerm, each_leg, shape_probabilities
-from rrru.diagnosis.unsupported import unsupported
 from rrru.diagnosis.whitened import DISCREPANCY_SCALES, spectrum
 from rrru.effects.library import HOLDS
 from rrru.effects.protocol import Coordinates
@@ -335,18 +335,26 @@ def infer(problem: DiagnosisProblem, prior: Prior, stated: str = KNOWN) -> Infer
 
 
 def _outliers(inference: InferenceResult) -> BoolArray:
-    """Rows (m,) that stand alone under an inference, or are explained by an effect that they alone support."""
+    """Rows (m,) that stand alone under an inference, or are explained by an effect that they alone support.
+
+    An effect of many coefficients supports a reading where the other stops predict it better with the effect than
+    without it. Where something is unexplained a reading may follow that.
+    """
     problem, effects = inference.problem, inference.hypothesis.effects
     found = isolated(problem.residual(inference.state), problem.series, problem.noise_mm, problem.kind)
-    broad = {name for name in effects - set(UNKNOWN) if problem.library[name].coordinates.broad}
-    if found.any() or not broad:
+    broad = {name for name in effects if problem.library[name].coordinates.broad}
+    if found.any() or not broad or inference.level or not effects.isdisjoint(UNKNOWN):
+        return found
+    fitted = np.isin(problem.at, inference.fit.model.problem.at)
+    predicted = prediction_errors(inference.fit)
+    found[fitted] = isolated(predicted, problem.series[fitted], problem.noise_mm, problem.kind[fitted])
+    if not found.any():
         return found
     apart = with_effects(inference, effects - broad)
     residual = apart.problem.residual(apart.state)
-    found = isolated(residual, problem.series, problem.noise_mm, problem.kind)
-    fitted = np.isin(problem.at, inference.fit.model.problem.at)
-    found[fitted] = unsupported(inference.fit, found[fitted], residual[fitted])
-    return found & fitted
+    found &= isolated(residual, problem.series, problem.noise_mm, problem.kind)
+    found[fitted] &= (predicted**2).sum(axis=1) > OPTIONS.max_unsupported_share * (residual[fitted] ** 2).sum(axis=1)
+    return found
 
 
 def with_effects(inference: InferenceResult, effects: Collection[str]) -> InferenceResult:

@@ -62,6 +62,9 @@ class DiagnosisOptions:
     max_searched_order_p: float = 0.01
     # probability of smaller residuals by chance below which the noise is found again after a fit; assumed
     max_noise_again_p: float = 0.01
+    # a reading that an effect of many coefficients explains is one of its own where the other stops predict it with the
+    # effect, of the mean square without it, with this share or more; assumed
+    max_unsupported_share: float = 0.5
     # rounds of leaving out outliers; assumed
     max_outlier_rounds: int = 3
     # rounds of search and fit until the best hypothesis stays; assumed
