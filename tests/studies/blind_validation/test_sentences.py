@@ -420,6 +420,25 @@ def test_files_are_read_again_without_the_package(tmp_path, kind, form):
     assert Rotation.from_matrix(turn.transpose(0, 2, 1) @ turned).magnitude().max() < 1e-5
 
 
+def test_a_payload_hangs_at_the_platform_of_a_file(tmp_path):
+    """A platform without a mass of its own has its centre of mass elsewhere in MuJoCo."""
+    from types import SimpleNamespace
+
+    from rrru.studies.blind_validation.sentences.kinds import KINDS
+    from rrru.studies.blind_validation.sentences.truth import file_poses
+
+    robot, stiffness = KINDS["arm4"](np.random.default_rng(2)), 5e4
+    values = np.random.default_rng(5).uniform(*robot.spans.T, (6, len(robot.units)))
+    payload_kg = np.array([0.0, 5.0, 5.0, 0.0, 10.0, 5.0])
+    file = tmp_path / "own.xml"
+    file.write_text(robot.text("mjcf").replace('kp="1e8"', f'kp="{stiffness}"'))
+    place, _, _ = file_poses(file, SimpleNamespace(kind="mjcf", nominal=robot), values, payload_kg)
+    deflected = robot.loads(values, payload_kg) / (1e3 * stiffness)
+    expected, _ = robot.poses(values + deflected)
+    assert np.linalg.norm(expected - robot.poses(values)[0], axis=1).max() > 0.3
+    np.testing.assert_allclose(place, expected, atol=2e-3)
+
+
 def test_mujoco_drives_what_numpy_says(monkeypatch):
     """Without errors of its seats a gantry stands where its drives are, and lags by half its play."""
     from dataclasses import replace

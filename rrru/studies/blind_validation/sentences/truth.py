@@ -319,20 +319,20 @@ def _mjcf_poses(file, draw, values, payload_kg):
     stiff = np.array([model.actuator_gainprm[_servo(model, one.id), 0] for one in joints])
     places, turns = [], []
     loops = bool(((model.eq_type == mujoco.mjtEq.mjEQ_CONNECT) | (model.eq_type == mujoco.mjtEq.mjEQ_WELD)).any())
-    own_kg = float(model.body_mass[body])
     for row, load in zip(values, payload_kg, strict=True):
         data.qpos[:], data.qvel[:] = start, 0.0
         data.qpos[address] = zero + scale * row
         if loops:
             _close(model, data, dof)
         elif np.isfinite(stiff).all():
-            model.body_mass[body] = own_kg + load
             mujoco.mj_forward(model, data)
-            data.qpos[address] -= data.qfrc_bias[dof] / stiff
+            # at the platform's point, where its centre of mass need not be
+            weight = np.zeros(model.nv)
+            mujoco.mj_applyFT(model, data, load * model.opt.gravity, np.zeros(3), data.xpos[body], body, weight)
+            data.qpos[address] -= (data.qfrc_bias - weight)[dof] / stiff
         mujoco.mj_kinematics(model, data)
         places.append(_MM * data.xpos[body])
         turns.append(data.xmat[body].reshape(3, 3).copy())
-    model.body_mass[body] = own_kg
     sites = {
         model.site(k).name: _MM * model.site_pos[k] for k in range(model.nsite) if int(model.site_bodyid[k]) == body
     }
