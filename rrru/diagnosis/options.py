@@ -345,9 +345,6 @@ class DiagnosisOptions:
     max_grid_distance_steps: float = 1.0
     # extents below this are none; rounding
     min_extent_mm: float = 1e-6
-    # distance from which the drives come: longer than any backlash
-    approach_distance_rad: float = 0.1
-    approach_distance_mm: float = 5.0
     # a drive's error changes with the drive so slowly that after two iterations it stays; one more is a margin
     correction_iterations: int = 3
     # drive values of both senses that are closer, in the drives' unit, are the same; rounding

@@ -23,8 +23,6 @@ from rrru.kinematics.robot import Robot
 
 # of drive values, in rad and in mm
 _ROUNDING = 1e-9
-# how far away the drives come from, longer than any backlash
-_APPROACH = {"rad": OPTIONS.approach_distance_rad, "mm": OPTIONS.approach_distance_mm}
 
 
 def corrected_drives(inference: InferenceResult, masses: Masses) -> pd.DataFrame:
@@ -117,18 +115,18 @@ def at_rest(
     """
     position, drive, payload, time_s = state
     count, nothing = len(position), np.zeros_like(position)
-    before = drive - approach * np.array([_APPROACH[unit] for unit in robot.parts.units])
-    path = np.stack([before, drive], axis=1).reshape(2 * count, -1)
     course = Course(
         position_mm=position,
         drive=drive,
-        path_drive=path,
-        path_index=2 * np.arange(count) + 1,
+        path_drive=drive,
+        path_index=np.arange(count),
         time_s=np.full(count, time_s),
         velocity_mm_s=nothing,
         acceleration_mm_s2=nothing,
         payload_kg=np.full(count, payload),
         drive_motion=(np.zeros_like(drive), np.zeros_like(drive)),
+        # from further away than any backlash, and any travel over which friction builds up
+        approach=approach,
     )
     motion: Motion = make_motion(robot, masses, course, (nominal, robot.map_at(nominal, position)))
     return motion

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from rrru.diagnosis.calibrate import calibrate
-from rrru.diagnosis.correction.drive_table import corrected_drives
+from rrru.diagnosis.correction.drive_table import at_rest, corrected_drives
 from rrru.diagnosis.make_problem import make_diagnosis_problem
 from rrru.diagnosis.state import ModelState
 from rrru.effects.library import find
@@ -50,3 +50,16 @@ def test_drives_that_move_stay_within_the_values_at_which_their_functions_are_kn
 def test_without_a_place_at_which_the_functions_are_known_the_table_is_empty(monkeypatch):
     table, _ = _table(monkeypatch, (1,), 1e-7)
     assert not len(table) and {"point", "payload_kg", "approach", *NAMES} <= {*table.columns}
+
+
+def test_a_drive_that_comes_from_one_side_has_wound_up_however_long_its_travel_is():
+    """Dahl's friction after a long way, -a from below and a from above, in any order of the rows."""
+    robot, amplitude = arms.ARM, np.full(arms.DRIVES, 4e-4)
+    drive = arms.drives(6, np.random.default_rng(4))
+    position = robot.forward(drive)
+    effect = find("friction_windup", robot)
+    for approach in (1, -1, np.random.default_rng(7).choice([-1.0, 1.0], drive.shape)):
+        motion = at_rest(robot, arms.MASSES, (position, drive, 0.0, 0.0), approach, drive)
+        found = effect.contribute(motion, [*amplitude, 0.8])
+        expected = motion.at_drives(np.broadcast_to(-approach * amplitude, drive.shape))
+        np.testing.assert_allclose(found.twists, expected.twists, atol=1e-15)
