@@ -298,6 +298,28 @@ def test_no_kind_is_without_a_judge():
         assert judge.judge(Claim(kind, "", {}), _truth(), _FACTS) is None
 
 
+def test_drives_that_bring_the_robot_nearer_than_the_estimate_are_right():
+    claim = Claim("corrected_drives bring it there", "", {})
+    assert judge.judge(claim, _truth(after_mm=0.05, drives_mm=0.01), _FACTS) is True
+
+
+def test_what_a_sample_of_fresh_stops_contradicts_within_its_errors_is_undecided():
+    """A few stops of many have all of what is left: another sample has twice as much, or half."""
+    few = {"after_mm": 0.1, "after_error_mm2": 0.005}
+    for value, expected in ((0.04, None), (0.09, True), (0.2, False)):
+        assert judge.judge(Claim("gap_after_rms_mm", "", {"value": value}), _truth(**few), _FACTS) is expected
+
+
+def test_the_sampling_error_is_that_of_many_samples():
+    from rrru.studies.blind_validation.sentences.truth import _sampling_error
+
+    generator = np.random.default_rng(3)
+    # two targets of a stop err alike
+    squares = np.repeat(np.where(generator.random((3000, 400, 1)) < 0.05, 4.0, 0.1), 2, axis=2)
+    found = np.mean([_sampling_error(one) for one in squares[:100]])
+    assert found == pytest.approx(squares.mean(axis=(1, 2)).std(), rel=0.05)
+
+
 def test_phases_may_have_gone_round():
     stated = {"effect": "encoder_eccentricity", "parameter": "phase1", "value": 3.1, "low_95": 3.0, "high_95": 3.2}
     eccentric = {"effects": frozenset(["encoder_eccentricity"]), "numbers": {"encoder_eccentricity": {"phase1": -3.12}}}

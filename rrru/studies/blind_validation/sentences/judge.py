@@ -1,8 +1,9 @@
 """Whether a Claim is true: a function for every kind, from the Truth to True, False, or None where that is undecided.
 
 A size without an interval is true within 25 % of the true value, plus three standard errors of the noise and the
-rounding to two printed digits. A number with a standard error is true within three standard errors. A 95 % interval is
-true where it contains the true number. Lengths mm, angles rad.
+rounding to two printed digits. The true value is one of a sample of fresh stops: what it contradicts by less than three
+of its own standard errors is undecided. A number with a standard error is true within three standard errors. A 95 %
+interval is true where it contains the true number. Lengths mm, angles rad.
 """
 
 import re
@@ -47,14 +48,18 @@ def judge(claim, truth, facts):
     return None if found is None else bool(found)
 
 
-def _sized(said, true, truth, count):
-    """Whether a size agrees with the true one within the tolerance for a count of points."""
+def _sized(said, true, truth, count, error_mm2=0.0):
+    """Whether a size agrees with the true one within the tolerance for a count of points.
+
+    error_mm2: standard error of the true mean square; None where that could make it agree.
+    """
     if not np.isfinite(true):
         return None
     spread = truth.noise_rms_mm**2 * np.sqrt(2.0 / (3.0 * count)) + 2.0 * truth.noise_rms_mm * true / np.sqrt(
         3.0 * count
     )
-    return abs(float(said) ** 2 - true**2) <= _ERRORS * spread + _NEAR * true**2
+    off = abs(float(said) ** 2 - true**2) - _ERRORS * spread - _NEAR * true**2
+    return True if off <= 0.0 else None if off <= _ERRORS * error_mm2 else False
 
 
 def _verdict_right(facts, truth):
@@ -318,8 +323,12 @@ def _not_worse(_stated, truth, _facts):
 
 
 def _drives(_stated, truth, _facts):
-    """The robot reaches the targets of corrected_drives with the error of the estimate."""
-    return _sized(truth.drives_mm, truth.after_mm, truth, truth.stops) if np.isfinite(truth.drives_mm) else None
+    """The robot reaches the targets of corrected_drives with at most the error of the estimate."""
+    if not np.isfinite(truth.drives_mm):
+        return None
+    return truth.drives_mm <= truth.after_mm or _sized(
+        truth.drives_mm, truth.after_mm, truth, truth.stops, truth.after_error_mm2
+    )
 
 
 def _detectable(stated, truth, facts):
@@ -367,7 +376,9 @@ def _turned(stated, _truth, _facts):
 
 
 _JUDGES = {
-    "the robot still misses by": lambda stated, t, _: _sized(stated["value"], t.before_mm, t, t.rows),
+    "the robot still misses by": lambda stated, t, _: _sized(
+        stated["value"], t.before_mm, t, t.rows, t.before_error_mm2
+    ),
     "nothing systematic is left": _none,
     "a cause with a share": _cause,
     "a cause with a size": _cause,
@@ -386,7 +397,7 @@ _JUDGES = {
     "probability of this answer": _probability,
     "it does not repeat": _scatter,
     "it is random error": _scatter,
-    "what is left with it": lambda stated, t, _: _sized(stated["value"], t.after_mm, t, t.rows),
+    "what is left with it": lambda stated, t, _: _sized(stated["value"], t.after_mm, t, t.rows, t.after_error_mm2),
     "that it shrinks cannot be seen": lambda _, t, __: t.before_mm < t.noise_rms_mm,
     "next, a run": _next_run,
     "next, none is advised": _unexplained,
@@ -427,10 +438,10 @@ _JUDGES = {
     "verdict": _verdict,
     "names in the verdict": lambda stated, t, _: set(stated["names"]) <= set(t.effects),
     "leg of the verdict": _leg,
-    "gap_rms_mm": lambda stated, t, _: _sized(stated["value"], t.before_mm, t, t.rows),
+    "gap_rms_mm": lambda stated, t, _: _sized(stated["value"], t.before_mm, t, t.rows, t.before_error_mm2),
     "noise_rms_mm": _noise,
     "worst place": _worst,
-    "gap_after_rms_mm": lambda stated, t, _: _sized(stated["value"], t.after_mm, t, t.rows),
+    "gap_after_rms_mm": lambda stated, t, _: _sized(stated["value"], t.after_mm, t, t.rows, t.after_error_mm2),
     "interval of share_closed": _closed,
     **{f"interval of a share: {kind}": _budget for kind in ("effect", "unexplained", "scatter", "runs")},
     "interval of a share: by direction": _by_factor,

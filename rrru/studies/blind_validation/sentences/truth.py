@@ -38,9 +38,10 @@ class Truth:
     single drive, or 0; strength: residual rms of the cause after a calibration of exact readings, over the noise rms;
     chi2: the same as a chi-square of the file's readings; numbers: true values by effect and parameter; geometry:
     values of the calibration's parameters from exact readings without a cause; zeros: of the drives by site; before_mm,
-    after_mm: rms at fresh stops of the calibrated and of the corrected model; seen_mm: of the calibrated one at the
-    file's rows; still_mm: residual rms of a calibration of exact readings without a cause; rows, stops: numbers in
-    the file; again: stops were measured twice; payloads: number of different ones; turned: orientations were measured;
+    after_mm: rms at fresh stops of the calibrated and of the corrected model; before_error_mm2, after_error_mm2:
+    standard errors of their squares, from the sample of these stops; seen_mm: of the calibrated one at the file's rows;
+    still_mm: residual rms of a calibration of exact readings without a cause; rows, stops: numbers in the file; again:
+    stops were measured twice; payloads: number of different ones; turned: orientations were measured;
     error_mm, position_mm (rows, 3): exact errors of the calibrated model and their positions; payload_kg (rows,);
     places: of the targets by name; given_mm, file_mm: rms at fresh stops of the robot's file as given and as corrected,
     NaN where that is not known; given_read_mm, file_read_mm: the same at the file's readings; drives_mm: rms distance
@@ -69,6 +70,8 @@ class Truth:
     error_mm: np.ndarray
     position_mm: np.ndarray
     payload_kg: np.ndarray
+    before_error_mm2: float = 0.0
+    after_error_mm2: float = 0.0
     places: dict = field(default_factory=dict)
     given_mm: float = np.nan
     file_mm: float = np.nan
@@ -135,7 +138,15 @@ def truth_of(draw, run, folder):
         payload_kg=exact["payload_kg"].to_numpy()[chosen],
         places=dict(draw.targets),
     )
-    return replace(truth, **_of_files(draw, run, exact, fresh), drives_mm=_of_drives(draw, run))
+    errors = [_sampling_error((one[fresh] ** 2).sum(axis=1).reshape(-1, len(draw.targets))) for one in (before, after)]
+    sampled = dict(zip(("before_error_mm2", "after_error_mm2"), errors, strict=True))
+    return replace(truth, **sampled, **_of_files(draw, run, exact, fresh), drives_mm=_of_drives(draw, run))
+
+
+def _sampling_error(squares_mm2):
+    """Standard error of the mean of squares (stops, targets) of a sample of stops."""
+    of_stops = squares_mm2.mean(axis=1)
+    return float(of_stops.std(ddof=1) / np.sqrt(len(of_stops)))
 
 
 def _rms(values):
