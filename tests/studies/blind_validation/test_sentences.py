@@ -19,6 +19,11 @@ _OUTSIDE = {"effects": [], "unexplained": True, "probability": 0.97, "notes": []
 _GRID = np.stack(np.meshgrid(*[np.arange(5.0)] * 3), axis=-1).reshape(-1, 3)
 
 
+def _undecided(separates):
+    """Facts of a page about two answers that no run would decide between."""
+    return {"undecided": {"separates": separates, "inspect": []}}
+
+
 def _truth(**more):
     """A robot whose second drive has a play that is plainly seen: 0.3 mm of a noise of 0.035 mm."""
     stated = {
@@ -111,8 +116,8 @@ _CASES = [
     ("next, none is advised", ({}, _UNKNOWN, _OUTSIDE), ({}, {}, _OUTSIDE)),
     (
         "next, nothing would decide",
-        ({"contest": "between backlash and servo lag"}, {}, _FACTS),
-        ({"contest": "whether servo lag acts"}, {}, _FACTS),
+        ({"contest": "between backlash and servo lag"}, {}, _FACTS | _undecided("backlash / servo_lag")),
+        ({"contest": "whether servo lag acts"}, {}, _FACTS | _undecided("axis_tilt / axis_tilt+servo_lag")),
     ),
     ("next, nothing more", ({}, {}, _FACTS), ({}, _UNKNOWN, _FACTS)),
     (
@@ -296,6 +301,16 @@ def test_no_kind_is_without_a_judge():
         assert judge.judge(Claim(kind, "", {}), _truth(), _FACTS) is always
     for kind in (*_NEVER, UNKNOWN):
         assert judge.judge(Claim(kind, "", {}), _truth(), _FACTS) is None
+
+
+def test_an_open_question_whose_answers_hold_the_truth_is_no_false_one():
+    claim = Claim("next, nothing would decide", "", {"contest": "whether servo lag acts"})
+    for separates, expected in (
+        ("backlash / backlash+servo_lag", True),
+        ("none / servo_lag", False),
+        ("backlash+unexplained / servo_lag", False),
+    ):
+        assert judge.judge(claim, _truth(), _FACTS | _undecided(separates)) is expected
 
 
 def test_drives_that_bring_the_robot_nearer_than_the_estimate_are_right():

@@ -362,8 +362,15 @@ def _next_run(stated, truth, _facts):
     return stated["run"].startswith(("stops", "poses")) or bool(re.match(r"\d+ poses", stated["run"]))
 
 
-def _next_inspection(stated, truth, _facts):
-    """An acting cause is among those that no run would decide between; undecided where it is not detectable."""
+def _next_inspection(stated, truth, facts):
+    """An acting cause is among those that no run would decide between, or one of the two answers is the true one.
+
+    Undecided where the cause is not detectable. The sentence has only what distinguishes the answers: "whether a acts"
+    is open between b alone and a with b.
+    """
+    answers = [set(side.split("+")) - {"none"} for side in facts["undecided"]["separates"].split(" / ")]
+    if truth.effects | ({"unexplained"} if truth.outside else set()) in answers:
+        return True
     words = re.sub(r"^(?:between|whether) | acts$", "", stated["contest"])
     if _one_of(re.split(r" and | \+ ", words), truth):
         return True
