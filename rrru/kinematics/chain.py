@@ -81,6 +81,11 @@ class BarPose:
         """Unit vectors (n, 3) along it."""
         return self.frame[:, :, 0]
 
+    @property
+    def span_mm(self) -> FloatArray:
+        """Distances (n,) between its ball joints."""
+        return np.asarray(np.linalg.norm(self.far - self.near, axis=1))
+
 
 @dataclass(frozen=True)
 class Walk:

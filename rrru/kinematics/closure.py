@@ -7,7 +7,9 @@ screws and W_i the wrenches reciprocal to them, W_i S_i = 0, the step obeys
 
 The W_i of legs that share passive joints are blocks of one W (`rrru.kinematics.wrenches`); their equations are added. A
 bar has one wrench, the unit force along its line, and e_i its missing length. More than six wrenches are met by
-least squares. Screws and twists are at the world's origin, the velocity first: (v, w). The compiled iteration of
+least squares. Bars then share what they contradict each other in as elastic ones of one section and material do: the
+stiffness of a bar is in inverse proportion to its length, EA / l, so that its equation is scaled by 1 / sqrt(l). Screws
+and twists are at the world's origin, the velocity first: (v, w). The compiled iteration of
 `rrru.kinematics.closure_kernel` takes the legs as flat arrays. Lengths in mm, angles in rad.
 """
 
@@ -71,8 +73,13 @@ class Closure:
         self.row_count, self.rows = int(ends[-1]), [slices[k] for k in range(len(legs.legs))]
 
     def wrenches(self, ways: Sequence[Walk], _poses: Poses) -> list[FloatArray]:
-        """Wrenches (n, r, 6) of every leg that are reciprocal to its passive joints."""
-        return wrenches_of(self.legs, self._spare, ways)
+        """Wrenches (n, r, 6) of every leg that are reciprocal to its passive joints, those of redundant bars scaled."""
+        found = wrenches_of(self.legs, self._spare, ways)
+        if self.row_count > 6:
+            for number, way in enumerate(ways):
+                if way.bar:
+                    found[number] = found[number] * np.sqrt(CHARACTERISTIC_LENGTH_MM / way.bar.span_mm)[:, None, None]
+        return found
 
     def inverse(self, wrenches: Sequence[FloatArray]) -> FloatArray:
         """Twists (n, 6, rows) of the platform per constraint, the inverse of the wrenches A of all legs."""

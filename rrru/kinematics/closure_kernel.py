@@ -197,10 +197,12 @@ def _count_bar(
         moment[1] / CHARACTERISTIC_LENGTH_MM,
         moment[2] / CHARACTERISTIC_LENGTH_MM,
     )
+    # where bars contradict each other they share a load as their elasticity by length does
     for i in range(6):
+        stiff = wrench[i] * CHARACTERISTIC_LENGTH_MM / length
         for c in range(i, 6):
-            equations[k + i, k + c] += wrench[i] * wrench[c]
-        equations[k + i, k + 6] += wrench[i] * lack / CHARACTERISTIC_LENGTH_MM
+            equations[k + i, k + c] += stiff * wrench[c]
+        equations[k + i, k + 6] += stiff * lack / CHARACTERISTIC_LENGTH_MM
     return lack
 
 

@@ -209,8 +209,8 @@ class TwistMap:
             for joint, axis, place in zip(leg.joints, way.axes, way.places, strict=True):
                 if joint.drive is not None:
                     result[:, rows, joint.drive] += np.einsum("nri,ni->nr", one, screw(joint, axis, place))
-            if leg.bar and leg.bar.drive is not None:
-                result[:, rows, leg.bar.drive] += 1.0
+            if leg.bar and way.bar and leg.bar.drive is not None:
+                result[:, rows, leg.bar.drive] += np.einsum("nri,ni->nr", one[..., :3], way.bar.line)
         return result
 
     def wrenches(self, load: FloatArray) -> FloatArray:

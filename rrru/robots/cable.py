@@ -1,8 +1,8 @@
 """Cable robots: a platform on taut cables, whose lengths are driven, in space or in a plane.
 
 A cable is a bar under tension; the forces that keep it taut are not modelled. More cables than the platform has degrees
-of freedom are met by least squares. In a plane a leg of two slides and a turn, none driven, keeps the platform in x, y.
-Lengths in mm, angles in rad.
+of freedom share what they contradict each other in as elastic ones do (`rrru.kinematics.closure`). In a plane a leg of
+two slides and a turn, none driven, keeps the platform in x, y. Lengths in mm, angles in rad.
 """
 
 from typing import Any

@@ -4,7 +4,8 @@ T is the platform's twist, S_i a leg's passive screws, e_i what it lacks, P_i th
 
     sum P_i T = sum P_i e_i,   dp_i = S_i^+ (T - e_i)
 
-A bar has w w^T in place of P_i, w its line. Lengths in mm, angles in rad; in twists lengths are counted in 500 mm.
+A bar has w w^T / l in place of P_i, w its line and l its length. Lengths in mm, angles in rad; in twists lengths are
+counted in 500 mm.
 """
 
 import numpy as np
@@ -84,10 +85,12 @@ def _step(legs, ranks, actuators, poses, twists):
         way = walk(legs, leg, actuators, poses.passive, twists)
         if leg.bar:
             near, far, length = bar_ends(legs, leg, way, poses, actuators, twists)
-            line = (far - near) / np.linalg.norm(far - near, axis=1, keepdims=True)
+            span = np.linalg.norm(far - near, axis=1)[:, None]
+            line = (far - near) / span
             line = np.concatenate([line, cross(near, line)], axis=1) * _SCALE / _CHARACTERISTIC_LENGTH_MM
-            total = total + line[:, :, None] * line[:, None, :]
-            pull = pull + line * (length - np.linalg.norm(far - near, axis=1))[:, None] / _CHARACTERISTIC_LENGTH_MM
+            stiff = line * _CHARACTERISTIC_LENGTH_MM / span
+            total = total + stiff[:, :, None] * line[:, None, :]
+            pull = pull + stiff * (length[:, None] - span) / _CHARACTERISTIC_LENGTH_MM
         else:
             u, size, v = np.linalg.svd(_passive_screws(leg, way) / _SCALE[:, None], full_matrices=False)
             u, size, v = u[:, :, :rank], size[:, None, :rank], v[:, :rank]
