@@ -233,8 +233,16 @@ class ModelSpace:
                 for out in range(len(neighbour) - 1):
                     remaining = [k for k in range(len(neighbour)) if k != out]
                     smaller = tuple(neighbour[k] for k in remaining)
-                    self._evaluate(smaller, level, scales[remaining])
-                    found.reach(smaller)
+                    if self._may_matter(smaller, level, scales[remaining]):
+                        self._evaluate(smaller, level, scales[remaining])
+                        found.reach(smaller)
+
+    def _may_matter(self, terms: Sequence[EffectTerm], level: int, scales: FloatArray) -> bool:
+        """Whether a set is not hopeless at its prior scales, by more than other ones may gain."""
+        if frozenset(terms) in self._known:
+            return True
+        height = self._at(terms, scales, level) + self._weigher.terms(terms)
+        return height > self._highest - OPTIONS.hopeless_nats - OPTIONS.window_nats
 
     def _on_neighbouring_legs(self, centre: Hypothesis) -> Iterator[tuple[tuple[EffectTerm, ...], FloatArray]]:
         """Sets that may matter with one term on a leg more or less, that term last, and their prior scales."""
