@@ -51,7 +51,7 @@ class Arm:
     @property
     def is_sure(self):
         """Whether each decision of the verdict is probable enough."""
-        return sureness(self.found) >= SURE
+        return least_sure_probability(self.found) >= SURE
 
 
 def answer(found):
@@ -68,7 +68,7 @@ def answer(found):
     return parts or {frozenset([NONE]): decided.probability}
 
 
-def sureness(found):
+def least_sure_probability(found):
     """Probability of the least sure decision of a Diagnosis on a single cause, or on a group, of 0 to 1."""
     parts, posterior = answer(found), found.inference.posterior
     others = {name: posterior.marginal(name) for name in found.inference.problem.effects}
@@ -135,7 +135,7 @@ def _verdict_columns(when, found, robot):
     """Verdict, probability of its least sure decision and whether it is correct, as columns with the suffix `when`."""
     return {
         f"verdict_{when}": found.verdict["effects"],
-        f"probability_{when}": sureness(found),
+        f"probability_{when}": least_sure_probability(found),
         f"right_{when}": names_the_truth(robot.truth, answer(found)),
     }
 

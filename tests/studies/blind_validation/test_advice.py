@@ -143,7 +143,7 @@ _PAIR = [
 )
 def test_a_verdict_is_as_sure_as_its_least_sure_decision(entries, sure, truths):
     found = _found(entries)
-    assert advice.sureness(found) == pytest.approx(sure)
+    assert advice.least_sure_probability(found) == pytest.approx(sure)
     assert advice.names_the_truth(truths, advice.answer(found))
     assert not advice.names_the_truth("thermal_growth", advice.answer(found))
 
