@@ -184,7 +184,11 @@ def _page(lines: int, causes: int, trajectories: int, used: pd.DataFrame) -> tup
 def _headline(verdict: pd.Series, causes: pd.DataFrame, words: _DriveNames) -> tuple[list[str], list[str]]:
     """Lines of the verdict itself, and of its facts and the next step."""
     groups = {names.split(" | ")[0]: names.replace(" | ", " or ") for names in verdict["groups"].split("; ")}
-    name = _named("+".join(groups.get(one, one) for one in verdict["effects"].split("+")))
+    effects = verdict["effects"].split("+")
+    possible = set(causes.loc[causes["decision"] == "possible", "effect"])
+    nothing_named = set(effects) <= possible
+    unsure = set() if nothing_named else possible
+    name = _named("+".join(groups.get(one, f"possibly {one}" if one in unsure else one) for one in effects))
     name += f", {_leg(str(verdict['leg']), **words)}" if verdict["leg"] else ""
     if verdict["no_answer"]:
         return wrap(f"no cause is named: {verdict['no_answer']}", int(0.8 * _WIDE)), []
@@ -192,8 +196,7 @@ def _headline(verdict: pd.Series, causes: pd.DataFrame, words: _DriveNames) -> t
     # of a group alone that one of it acts, else of exactly these
     alone = causes.loc[causes["effect"] == verdict["effects"], "group_probability"].dropna()
     sure = _probability(alone.iloc[0] if len(alone) else verdict["probability"], "= ", " ")
-    single = causes[causes["effect"].isin(set(verdict["effects"].split("+")) - groups.keys())]
-    if (single["decision"] == "possible").any():
+    if nothing_named:
         name = f"no cause named, most probable {name}"
     first = f"{name} (p {sure}): {style.number(verdict['gap_rms_mm'])} mm gap, {closed}"
     place = ", ".join(f"{axis} {verdict[f'worst_{axis}_mm']:.0f}" for axis in "xyz").replace("-", "\N{MINUS SIGN}")

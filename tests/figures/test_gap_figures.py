@@ -129,6 +129,14 @@ def test_the_headline_names_no_cause_where_none_is_probable_enough(frames):
     assert bold.startswith("no cause named, most probable backlash (p = 0.33): 0.37 mm gap")
 
 
+def test_the_headline_says_which_causes_are_possible_next_to_a_named_one(frames):
+    causes = frames["gap_attribute"].copy()
+    causes.loc[causes["effect"] == "backlash", "decision"] = "possible"
+    verdicts = frames["gap_verdicts"].assign(effects="link_flexure+backlash", leg=0, probability=0.33)
+    bold, *_ = written(draw("gap", frames | {"gap_attribute": causes, "gap_verdicts": verdicts}).axes[0])
+    assert bold.startswith("link flexure + possibly backlash (p = 0.33): ")
+
+
 def test_causes_are_ordered_and_the_verdict_s_are_in_colour(frames):
     axes = panel(plain("gap"), "(b)")
     names = [label.get_text() for label in axes.get_yticklabels()]
