@@ -44,7 +44,7 @@ _READABLE = {"1": ("", 1.0), "rad/(N mm)": ("µrad/(N m)", 1e9), "mm/(N mm)": ("
 _READABLE |= {"mm/N": ("µm/N", 1e3), "1/K": ("µm/(m K)", 1e6), "mm/s": ("µm/s", 1e3), "rad/s": ("µrad/s", 1e6)}
 _LIMITED = (NO_PAYLOAD, WITHIN_LIMITS)
 _UNSURE = "No cause is probable enough to be named; the most probable answer follows."
-_NOT_ALL = "More acts than what is named, and no further cause is probable enough; the most probable answer follows."
+_NOT_ALL = "More acts than the named causes, and no further one is probable enough; the most probable answer follows."
 _NO_SIZE = "Its size is not determined, because no masses of the links are stated."
 # what looks like random error above the stated noise, by the note on repeated poses; else it does not repeat
 _ABOVE_NOISE = "is random error above the stated noise. Repeatability is unknown:"

@@ -5,8 +5,8 @@ lead of (1 + s_k) times that, the slide of drive k stands at (1 + s_k) q_k, so t
 
     dq_k = s_k q_k
 
-All slides go one share too far where their screws are of one lot, or all as warm: as if the instrument had another
-millimetre (`tracker_scale`), which no campaign tells from it where all directions are those of slides.
+All slides go one share too far where their screws are of one lot, or all as warm. The readings are those of an
+instrument whose scale is off (`tracker_scale`), where all directions are those of slides.
 
 It enters at the drive's value. The constant part is the zero offset of the drive, which the calibration finds. It is
 linear, does not depend on time, load or direction, and repeats exactly.

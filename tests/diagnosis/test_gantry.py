@@ -52,7 +52,7 @@ def test_a_screw_that_grows_from_its_middle_is_found_with_its_time_constant():
     assert numbers["time_constant"] == pytest.approx(700.0, rel=0.15)
 
 
-def test_slides_that_are_all_long_by_one_share_may_be_measured_in_another_millimetre():
+def test_slides_that_all_go_one_share_too_far_may_be_read_by_an_instrument_whose_scale_is_off():
     """Of screws that are warm, or of one lot, three equal shares were taken for chance: 0.99 for "tracker scale"."""
     found, *_ = _diagnosed(campaign(grown=lambda way, time: 3e-4 * way, seed=4), without=_OF_NO_SHARE)
     posterior = found.inference.posterior
@@ -61,7 +61,7 @@ def test_slides_that_are_all_long_by_one_share_may_be_measured_in_another_millim
     assert 0.1 < posterior.marginal("lead_error") < 0.5 and "lead_error" in found.decided.confounded_with
 
 
-def test_slides_that_are_long_by_shares_of_their_own_are_not_measured_in_another_millimetre():
+def test_slides_that_go_shares_of_their_own_too_far_are_no_scale_of_the_instrument():
     way_off = campaign(grown=lambda way, time: way * [3e-4, -1e-4, 2e-4], seed=5)
     found, numbers, errors = _diagnosed(way_off, without=_OF_NO_SHARE)
     assert found.verdict["effects"] == "lead_error" and found.decided.groups == ()

@@ -315,7 +315,7 @@ def test_where_more_acts_than_what_is_named_the_further_causes_are_called_possib
     causes = causes.assign(decision=causes["decision"].mask(causes["effect"] == "backlash", "possible"))
     facts = answered(causes=causes)
     said = facts["sentences"]
-    assert said[1].startswith("More acts than what is named, and no further cause is probable enough; ")
+    assert said[1].startswith("More acts than the named causes, and no further one is probable enough; ")
     assert sum(" is possibly backlash" in one for one in said) == 1
     assert any(" is link flexure" in one for one in said)
     assert "possibly backlash" in next(one for one in said if one.startswith("Causes by their share"))

@@ -121,20 +121,19 @@ def test_a_group_alone_has_its_own_probability_in_the_headline(frames):
     assert "not ruled out" not in " ".join(rest)
 
 
-def test_the_headline_names_no_cause_where_none_is_probable_enough(frames):
+@pytest.mark.parametrize(
+    ("effects", "said"),
+    [
+        ("backlash", "no cause named, most probable backlash (p = 0.33): 0.37 mm gap"),
+        ("link_flexure+backlash", "link flexure + possibly backlash (p = 0.33): 0.37 mm gap"),
+    ],
+)
+def test_the_headline_says_which_causes_are_not_probable_enough_for_a_name(frames, effects, said):
     causes = frames["gap_attribute"].copy()
     causes.loc[causes["effect"] == "backlash", "decision"] = "possible"
-    verdicts = frames["gap_verdicts"].assign(effects="backlash", leg=0, probability=0.33)
+    verdicts = frames["gap_verdicts"].assign(effects=effects, leg=0, probability=0.33)
     bold, *_ = written(draw("gap", frames | {"gap_attribute": causes, "gap_verdicts": verdicts}).axes[0])
-    assert bold.startswith("no cause named, most probable backlash (p = 0.33): 0.37 mm gap")
-
-
-def test_the_headline_says_which_causes_are_possible_next_to_a_named_one(frames):
-    causes = frames["gap_attribute"].copy()
-    causes.loc[causes["effect"] == "backlash", "decision"] = "possible"
-    verdicts = frames["gap_verdicts"].assign(effects="link_flexure+backlash", leg=0, probability=0.33)
-    bold, *_ = written(draw("gap", frames | {"gap_attribute": causes, "gap_verdicts": verdicts}).axes[0])
-    assert bold.startswith("link flexure + possibly backlash (p = 0.33): ")
+    assert bold.startswith(said)
 
 
 def test_causes_are_ordered_and_the_verdict_s_are_in_colour(frames):

@@ -61,7 +61,7 @@ _SENTENCES = {
     "something is unexplained": rf"(?:Another|It is systematic, and no effect .*:) "
     rf"(?:(?P<share>{_NUMBER}) %|(?:an )?undetermined share) .*",
     "no cause is sure": r"No cause is probable enough to be named; .*",
-    "more acts": r"More acts than what is named, .*",
+    "more acts": r"More acts than the named causes, .*",
     "the unexplained follows": r"The unexplained part follows .*",
     "causes by share": r"Causes by their share of the gap: (?P<listed>.*)\.",
     "a group of causes": r"One of these acts, and these data cannot tell which: (?P<listed>.*) "
