@@ -2,12 +2,13 @@
 
 They compete with the library on the same data. An effect that acts has few parameters and wins. Where a function wins,
 the gap depends on the drives, the time, the place or the load in a way that the library does not hold. The verdict then
-is "unexplained".
+is "unexplained". What moves once, such as an instrument that is bumped, is no smooth function of the time: it makes the
+readings jump at a moment, which `rrru.diagnosis.time_jumps` finds.
 """
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TypeAlias
 
 import numpy as np
@@ -18,15 +19,18 @@ from rrru.effects.protocol import Contribution, Coordinates, Effect, Motion
 from rrru.kinematics.legs import TOOL, WORLD
 from rrru.kinematics.robot import Robot
 
+# a frame that turns moves what is so far from the robot's as much as its shift does
+_TURNED_ABOUT_MM = 1000.0
 _DRIVE_ORDERS, _TIME_ORDERS = (1, 2, 3, 4, 5, 6), (1, 2, 3)
 
 
 @dataclass(frozen=True)
 class Unknown:
-    """A smooth function; basis: motion to functions (n, k), or (n, K, k) of each drive, of about unit size.
+    """A smooth function, or a jump; basis: motion to functions (n, k), or (n, K, k) of each drive, of about unit size.
 
     per_leg: added to each actuator value, else to each axis of each of the sites; typical: size of coefficients in the
-    drive's unit or mm.
+    drive's unit or mm; turns: whether the sites turn as well; moment: of a jump, in s, None of a smooth function;
+    log_prior: log probability of its moment.
     """
 
     name: str
@@ -39,6 +43,9 @@ class Unknown:
 
     drives: int = 3
     sites: tuple[str, ...] = (WORLD,)
+    turns: bool = False
+    moment: float | None = None
+    log_prior: float = 0.0
     # capabilities of an `rrru.effects.protocol.Effect` that no function has
     with_waves = None
     switches = False
@@ -56,28 +63,27 @@ class Unknown:
 
     @cached_property
     def coordinates(self) -> Coordinates:
-        """One coefficient per function and drive, or axis of a site, in the drive's unit or mm."""
-        legs = np.zeros((self.drives if self.per_leg else 3 * len(self.sites)) * self.count, dtype=int)
-        return Coordinates(np.full(len(legs), self.typical), legs, legs > 0, lambda values, _: values)
+        """One coefficient per function and drive, or axis of a site, in the drive's unit, mm or rad."""
+        each = [self.typical] * 3 + [self.typical / _TURNED_ABOUT_MM] * (3 if self.turns else 0)
+        size = np.repeat([self.typical] * self.drives if self.per_leg else each * len(self.sites), self.count)
+        legs = np.zeros(len(size), dtype=int)
+        return Coordinates(size, legs, legs > 0, lambda values, _: values, log_prior=self.log_prior)
 
     def contribute(self, motion: Motion, values: FloatArray) -> Contribution:
         """Changes under coefficients (drives, or sites times axes, times k,)."""
         coefficients, functions = np.reshape(values, (-1, self.count)), self._cached(motion)
         if self.per_leg:
             return motion.at_drive_functions(self._of_each_drive(motion), coefficients)
-        shifts = np.split(functions @ coefficients.T, len(self.sites), axis=1)
-        return motion.at(
-            {
-                site: np.concatenate([shift, np.zeros_like(shift)], axis=1)
-                for site, shift in zip(self.sites, shifts, strict=True)
-            }
-        )
+        twists = np.zeros((len(functions), len(self.sites), 6))
+        moved = (functions @ coefficients.T).reshape(len(functions), len(self.sites), -1)
+        twists[..., : moved.shape[-1]] = moved
+        return motion.at({site: twists[:, k] for k, site in enumerate(self.sites)})
 
     def _cached(self, motion: Motion) -> FloatArray:
         """The functions along a motion, computed once."""
-        if self.name not in motion.cache:
-            motion.cache[self.name] = self.basis(motion)
-        functions: FloatArray = motion.cache[self.name]
+        if self.basis not in motion.cache:
+            motion.cache[self.basis] = self.basis(motion)
+        functions: FloatArray = motion.cache[self.basis]
         return functions
 
 
@@ -114,11 +120,25 @@ def _of_load(motion: Motion) -> FloatArray:
     return np.asarray(load[:, None] * _of_place(motion))
 
 
+def _after(motion: Motion, moment: float) -> FloatArray:
+    """A function (n, 1) that is 0 up to a moment in s, 1 after it, and NaN where the time is not known."""
+    return np.where(np.isfinite(motion.time_s), motion.time_s > moment, np.nan)[:, None]
+
+
 # what a term of a hypothesis may be of
 TestedEffect: TypeAlias = Effect | Unknown
 Library: TypeAlias = Mapping[str, TestedEffect]
 
-UNKNOWN = {
+_NO_MOMENT = partial(_after, moment=np.inf)
+JUMPS = {
+    function.name: function
+    for function in (
+        Unknown("unknown_jump", "one moment, as a move of the instrument", _NO_MOMENT, 1, ("time_s",), turns=True),
+        Unknown("unknown_zero_jump", "one moment, drive by drive", _NO_MOMENT, 1, ("time_s",), True, 1e-4),
+        Unknown("unknown_target_jump", "one moment, target by target", _NO_MOMENT, 1, ("time_s",)),
+    )
+}
+_SMOOTH = {
     function.name: function
     for function in (
         Unknown("unknown_drive", "the drives", _of_drives, len(_DRIVE_ORDERS), (), True, 1e-4),
@@ -136,7 +156,9 @@ UNKNOWN = {
         Unknown("unknown_load", "the payload", _of_load, 10, ("payload_kg",)),
     )
 }
+UNKNOWN = _SMOOTH | JUMPS
 # typical size of an error of a drive, and so of a function of its value
+_OF_TARGETS = ("unknown_targets", "unknown_target_jump")
 _TYPICAL = {"rad": 1e-4, "mm": 0.01}
 
 
@@ -150,11 +172,24 @@ def target_sites(robot: Robot) -> tuple[str, ...]:
 
 
 def unknown_functions(robot: Robot) -> dict[str, Unknown]:
-    """UNKNOWN for a robot's drives and targets; for drives of several units the first's typical size."""
+    """The smooth functions of UNKNOWN for a robot's drives and targets."""
+    return {name: _of_robot(function, robot) for name, function in _SMOOTH.items() if _has_sites(function, robot)}
+
+
+def jump_at(name: str, robot: Robot, moment: float, log_prior: float) -> Unknown:
+    """The jump of a name in JUMPS for a robot's drives and targets, at a moment in s."""
+    function = _of_robot(JUMPS[name], robot)
+    return replace(function, basis=partial(_after, moment=moment), moment=moment, log_prior=log_prior)
+
+
+def _of_robot(function: Unknown, robot: Robot) -> Unknown:
+    """A function for a robot's drives, of the first's typical size if they are of several units, or its targets."""
     units = robot.parts.units
-    of_targets = replace(UNKNOWN["unknown_targets"], sites=target_sites(robot))
-    return {
-        name: replace(function, typical=_TYPICAL[units[0]], drives=len(units)) if function.per_leg else function
-        for name, function in (UNKNOWN | {of_targets.name: of_targets}).items()
-        if function.sites
-    }
+    if function.per_leg:
+        return replace(function, typical=_TYPICAL[units[0]], drives=len(units))
+    return replace(function, sites=target_sites(robot)) if function.name in _OF_TARGETS else function
+
+
+def _has_sites(function: Unknown, robot: Robot) -> bool:
+    """Whether a robot has what a function is of."""
+    return function.name not in _OF_TARGETS or bool(target_sites(robot))

@@ -13,7 +13,7 @@ from rrru.campaign.outliers import isolated
 from rrru.diagnosis.aliases import EffectKey
 from rrru.diagnosis.calibrate import calibrate, origin
 from rrru.diagnosis.detectability import with_seen
-from rrru.diagnosis.discrepancy_basis import UNKNOWN
+from rrru.diagnosis.discrepancy_basis import JUMPS, UNKNOWN
 from rrru.diagnosis.drive_spectra import with_orders, with_spectra
 from rrru.diagnosis.evidence import ModelEvidence
 from rrru.diagnosis.heldout import HeldOut
@@ -27,6 +27,7 @@ from rrru.diagnosis.problem import DiagnosisProblem
 from rrru.diagnosis.settings import Prior
 from rrru.diagnosis.state import LinearizedProblem, ModelState
 from rrru.diagnosis.terms import EffectTerm, each_leg, shape_probabilities
+from rrru.diagnosis.time_jumps import with_jumps
 from rrru.diagnosis.whitened import DISCREPANCY_SCALES, spectrum
 from rrru.effects.library import HOLDS
 from rrru.effects.protocol import Coordinates
@@ -200,9 +201,10 @@ def _least_columns(problem: DiagnosisProblem, linear: LinearizedProblem) -> tupl
 def _blocks(
     problem: DiagnosisProblem, linear: LinearizedProblem
 ) -> tuple[dict[EffectKey, FloatArray], dict[EffectKey, FloatArray]]:
-    """Blocks of columns by (effect, shape), and apart from them those of shapes that were found in these data."""
+    """Blocks of columns by (effect, shape), and apart from them those of shapes and jumps found in these data."""
     blocks = {key: columns for key, columns in linear.columns.items() if key[0] in problem.library}
-    searched = {key: blocks.pop(key) for key in [*blocks] if _is_searched(problem.library[key[0]].coordinates, key[1])}
+    found = [key for key in blocks if key[0] in JUMPS or _is_searched(problem.library[key[0]].coordinates, key[1])]
+    searched = {key: blocks.pop(key) for key in found}
     return blocks, searched
 
 
@@ -233,8 +235,8 @@ def _with_significant(
 ) -> tuple[FloatArray, FloatArray | None]:
     """Columns (m, 3, k) and their prior s.d., and those of each searched shape that explains more than noise does.
 
-    The best of many orders explains more of pure noise than its number of columns: with it the noise would be found
-    too low. The F test is at a level that the prior probabilities of the orders share out (weighted Bonferroni:
+    The best of many orders or moments explains more of pure noise than its number of columns: with it the noise would
+    be found too low. The F test is at a level that their prior probabilities share out (weighted Bonferroni:
     Genovese, Roeder and Wasserman, False discovery control with p-value weighting, Biometrika 93, 2006).
     """
     (columns, prior_sd), accepted = chosen, []
@@ -248,7 +250,8 @@ def _with_significant(
         if prior_sd is None and not _is_enough(linear, linear.data.size - len(present) - len(own)):
             continue
         p_value, free = tests.of(present, own, None if prior_sd is None else prior_sd / problem.noise_mm)
-        level = OPTIONS.max_searched_order_p * shape_probabilities(problem.library[name].coordinates)[shape]
+        coordinates = problem.library[name].coordinates
+        level = OPTIONS.max_searched_p * shape_probabilities(coordinates)[shape] * np.exp(coordinates.log_prior)
         if p_value < level and (prior_sd is None or _is_enough(linear, free)):
             accepted.append(block)
             present = np.concatenate([present, own])
@@ -397,7 +400,7 @@ def fit_hypothesis(
 
 
 class _Linearization:
-    """Problem, columns and noise at a state, with the harmonics and spectra that the residuals show there."""
+    """Problem, columns and noise at a state, with the harmonics, spectra and jumps that the residuals show there."""
 
     def __init__(self, stated: str, stated_mm: float) -> None:
         self._stated, self._stated_mm = stated, stated_mm
@@ -410,7 +413,7 @@ class _Linearization:
         terms: Sequence[EffectTerm] = (),
         noise_again: bool = False,
     ) -> tuple[DiagnosisProblem, LinearizedProblem, str]:
-        """Problem with harmonics and noise, its linearisation at a state with hypothesis terms, source of the noise.
+        """Problem with harmonics, jumps and noise, its linearisation at a state with hypothesis terms, source of the noise.
 
         noise_again: whether the noise that was found about another state does not hold at this one.
         """
@@ -418,9 +421,10 @@ class _Linearization:
         problem, orders = with_orders(problem, linear, terms)
         problem, waves = with_spectra(problem, linear, terms)
         columns_of = {key: columns for key, columns in linear.columns.items() if key[0] in problem.library}
-        linear = replace(linear, columns=columns_of)
+        problem, jumps = with_jumps(problem, linear, state, terms)
         if orders or waves:
-            linear = replace(linear, columns=columns_of | problem.linearise(state, [*orders, *waves]).columns)
+            columns_of |= problem.linearise(state, [*orders, *waves]).columns
+        linear = replace(linear, columns=columns_of | jumps)
         if self._stated == KNOWN:
             return problem, linear, "given"
         # many columns take long to be projected out, and leave the same residuals at every state of a linear model

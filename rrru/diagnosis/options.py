@@ -58,8 +58,9 @@ class DiagnosisOptions:
     # --- noise and linearisation ---
     # share of the numbers read that the fitted columns leave, so that each reading still shows its noise; assumed
     min_free_share: float = 0.1
-    # probability that noise alone adds an order of a search to the columns that the noise is estimated after; assumed
-    max_searched_order_p: float = 0.01
+    # probability that noise alone adds an order, or a jump, of a search to the columns that it is estimated after;
+    # assumed
+    max_searched_p: float = 0.01
     # probability of smaller residuals by chance below which the noise is found again after a fit; assumed
     max_noise_again_p: float = 0.01
     # a reading that an effect of many coefficients explains is one of its own where the other stops predict it with the

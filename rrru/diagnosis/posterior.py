@@ -209,7 +209,7 @@ class Weigher:
         """Logarithm of the prior probability of a set of terms, whatever the discrepancy."""
         known = [term for term in terms if term.effect not in UNKNOWN]
         total = self._of_count(len(known), len(terms) - len(known))
-        for term in known:
+        for term in terms:
             of_shape, of_legs = self._of_term(term)
             total += of_shape
             total += of_legs
@@ -221,7 +221,7 @@ class Weigher:
         functions = len(terms) - len(known)
         more, same = self._of_count(len(known) + 1, functions), self._of_count(len(known), functions + 1)
         total = np.where(further.known, more, same)
-        for term in known:
+        for term in terms:
             of_shape, of_legs = self._of_term(term)
             total += of_shape
             total += of_legs
@@ -232,8 +232,7 @@ class Weigher:
     def priors_of(self, terms: Sequence[EffectTerm]) -> TermPriors:
         """The TermPriors of some terms."""
         known = np.array([term.effect not in UNKNOWN for term in terms], dtype=bool)
-        each = [self._of_term(term) if one else (0.0, 0.0) for term, one in zip(terms, known, strict=True)]
-        shape, legs = np.reshape(each, (-1, 2)).T
+        shape, legs = np.reshape([self._of_term(term) for term in terms], (-1, 2)).T
         return TermPriors(known, shape, legs)
 
     def _of_count(self, known: int, functions: int) -> float:
@@ -241,10 +240,13 @@ class Weigher:
         return self._sets[known] + functions * self._function if known < len(self._sets) else -np.inf
 
     def _of_term(self, term: EffectTerm) -> tuple[float, float]:
-        """Log prior of the shape and of the legs of one term of the library."""
+        """Log prior of the shape and of the legs of one term; of a discrepancy function that of its moment."""
         if term not in self._of_terms:
-            of_shape = float(self._effects[term.effect][term.shape])
-            self._of_terms[term] = of_shape, float(np.log(self._of_legs(term)))
+            if term.effect in UNKNOWN:
+                self._of_terms[term] = self._evidence.library[term.effect].coordinates.log_prior, 0.0
+            else:
+                of_shape = float(self._effects[term.effect][term.shape])
+                self._of_terms[term] = of_shape, float(np.log(self._of_legs(term)))
         return self._of_terms[term]
 
     def _of_legs(self, term: EffectTerm) -> float:

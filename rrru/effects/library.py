@@ -33,6 +33,7 @@ RESERVED = (
     *("none", "unexplained", "weight", "shape", "geometry", "calibration", "sampling", "scatter", "runs", "instrument"),
     *("unknown_drive", "unknown_zeros", "unknown_drift", "unknown_targets"),
     *("unknown_affine", "unknown_place", "unknown_load"),
+    *("unknown_jump", "unknown_zero_jump", "unknown_target_jump"),
 )
 # fields of a Motion that an effect may need
 _NEEDS = tuple(one.name for one in fields(Motion) if one.name not in ("robot", "path_index", "load_slopes", "approach"))
