@@ -133,9 +133,9 @@ _NO_MOMENT = partial(_after, moment=np.inf)
 JUMPS = {
     function.name: function
     for function in (
-        Unknown("unknown_jump", "one moment, as a move of the instrument", _NO_MOMENT, 1, ("time_s",), turns=True),
-        Unknown("unknown_zero_jump", "one moment, drive by drive", _NO_MOMENT, 1, ("time_s",), True, 1e-4),
-        Unknown("unknown_target_jump", "one moment, target by target", _NO_MOMENT, 1, ("time_s",)),
+        Unknown("unknown_jump", "a move of the instrument or the base", _NO_MOMENT, 1, ("time_s",), turns=True),
+        Unknown("unknown_zero_jump", "zero offsets of the drives", _NO_MOMENT, 1, ("time_s",), True, 1e-4),
+        Unknown("unknown_target_jump", "shifts of the targets", _NO_MOMENT, 1, ("time_s",)),
     )
 }
 _SMOOTH = {

@@ -185,7 +185,9 @@ class Weigher:
         # by effect the probabilities that it acts on some legs, and that it acts on each, on all alike, or on one
         self._kinds: dict[str, tuple[float, float]] = {}
         self._legs = {name: len(np.unique(effect.coordinates.legs)) for name, effect in library.items()}
-        self._functions = sum(name in UNKNOWN for name in library)
+        # log priors of the moments of jumps, 0 of smooth functions
+        self._moments = {name: library[name].coordinates.log_prior for name in UNKNOWN if name in library}
+        self._functions = len(self._moments)
         known = len(library) - self._functions
         self._sets = [prior.log_set(count, known) for count in range(known + 1)]
         self._function = float(np.log(prior.unexplained / max(self._functions, 1)))
@@ -243,7 +245,7 @@ class Weigher:
         """Log prior of the shape and of the legs of one term; of a discrepancy function that of its moment."""
         if term not in self._of_terms:
             if term.effect in UNKNOWN:
-                self._of_terms[term] = self._evidence.library[term.effect].coordinates.log_prior, 0.0
+                self._of_terms[term] = self._moments.get(term.effect, 0.0), 0.0
             else:
                 of_shape = float(self._effects[term.effect][term.shape])
                 self._of_terms[term] = of_shape, float(np.log(self._of_legs(term)))

@@ -15,7 +15,7 @@ from rrru.cache import cached_on
 from rrru.diagnosis.heldout import within
 from rrru.diagnosis.inference import InferenceResult
 from rrru.diagnosis.options import OPTIONS
-from rrru.diagnosis.smooth_functions import TIME, Regression, Variable, couplings, process, variables
+from rrru.diagnosis.smooth_functions import JUMP, TIME, Regression, Variable, couplings, process, variables
 from rrru.diagnosis.state import LeftByCalibration, LinearizedProblem
 from rrru.effects.protocol import Effect
 
@@ -29,6 +29,9 @@ _AMPLITUDES = (0.3, 1.0, 3.0)
 def remainder_rows(inference: InferenceResult) -> pd.DataFrame:
     """Rows of `gap_remainder` without the campaign, the variable that explains most first.
 
+    A jump that the most probable hypothesis has comes before it: stops on both sides of a pause do not distinguish a
+    jump from a function of the time. Of all drives or targets and of one it is that of the highest evidence.
+
     explained: share of the mean square, noise taken off, that is predicted at left-out points, 0 to 1; scale: distance
     over which the function changes, in the unit of its variable, NaN for steps; rms_mm: of the prediction.
     """
@@ -41,13 +44,16 @@ def remainder_rows(inference: InferenceResult) -> pd.DataFrame:
     fold = (stretch % OPTIONS.stretch_folds)[rows]
     noise = left.size * (1.0 - calibration.taken) * problem.noise_mm**2
     beyond = (left**2).sum() - noise
-    result = []
+    hypothesis, _ = inference.posterior.best()
+    result, first = [], {}
     for variable in _variables(inference, rows) if beyond > 0.0 else ():
-        predicted, scale = _predicted(variable, left, fold, problem.noise_mm, calibration)
+        predicted, scale, evidence = _predicted(variable, left, fold, problem.noise_mm, calibration)
         explained = 1.0 - (((left - predicted) ** 2).sum() - noise) / beyond
         rms = float(np.sqrt((predicted**2).sum(axis=1).mean()))
         result.append((variable.follows, float(np.clip(explained, 0.0, 1.0)), scale, variable.unit, rms))
-    result.sort(key=lambda row: -row[1])
+        if variable.jump in hypothesis.effects:
+            first[variable.follows] = evidence
+    result.sort(key=lambda row: (-first.get(row[0], -np.inf), -row[1]))
     return pd.DataFrame(result, columns=COLUMNS)
 
 
@@ -96,7 +102,7 @@ def _left(calibration: LeftByCalibration, values: FloatArray) -> FloatArray:
 
 def _depends_on(effect: Effect, follows: str) -> bool:
     """Whether an effect depends on the variable, in words, and on no other except those that it determines."""
-    return "time_s" in effect.needs if follows.startswith(TIME) else not effect.needs
+    return "time_s" in effect.needs if follows.startswith((TIME, JUMP)) else not effect.needs
 
 
 def _variables(inference: InferenceResult, rows: BoolArray) -> list[Variable]:
@@ -107,8 +113,8 @@ def _variables(inference: InferenceResult, rows: BoolArray) -> list[Variable]:
 
 def _predicted(
     variable: Variable, left: FloatArray, fold: IntArray, noise_mm: float, calibration: LeftByCalibration
-) -> tuple[FloatArray, float]:
-    """What a function of a variable predicts (m, 3) of the rows left out in each fold, and its scale.
+) -> tuple[FloatArray, float, float]:
+    """What a function of a variable predicts (m, 3) of the rows left out in each fold, its scale and log evidence.
 
     left (m, 3): the remainder; fold (m,): of its rows; calibration: absorbs of a function what it did of the readings.
     """
@@ -125,7 +131,7 @@ def _predicted(
     # a variable that changes has functions of finite evidence
     assert best is not None
     regression, amplitude, scale = best
-    return regression.left_out(fold, amplitude), scale
+    return regression.left_out(fold, amplitude), scale, highest
 
 
 def _functions(variable: Variable) -> Iterator[tuple[float, FloatArray]]:

@@ -2,8 +2,8 @@
 
 A function f of a drive's value, or of the time, is added to the drive and moves the positions by J f (J: derivative by
 the drive). So is a function of another drive's value: two drives are coupled. Or it is a function of the place, the
-time, the payload or the speed for each axis, of the time for each axis of the platform and one target, or steps with
-the sense of motion of the drives. A function is a Gaussian process of covariance a^2 exp(-d^2 / (2 l^2)) of the
+time, the payload or the speed for each axis, of the time for each axis of the platform and one target, steps with the
+sense of motion of the drives, or a jump at the moment that `rrru.diagnosis.time_jumps` has found. A function is a Gaussian process of covariance a^2 exp(-d^2 / (2 l^2)) of the
 distance d, by its values at inducing points (C. Rasmussen and C. Williams, Gaussian Processes for Machine
 Learning, 2006, sec. 8.3).
 """
@@ -20,10 +20,12 @@ from rrru.diagnosis.discrepancy_basis import target_sites
 from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.problem import DiagnosisProblem
 from rrru.diagnosis.state import ModelState
-from rrru.kinematics.legs import TOOL
+from rrru.diagnosis.time_jumps import jumps
+from rrru.kinematics.legs import TOOL, WORLD
 from rrru.robots.drive_words import drive_words
 
 TIME = "the time"
+JUMP = "a jump at"
 # kinds of variables that are alike: one for every drive, or target
 OF_DRIVES, OF_ZEROS, OF_TARGETS, ALONE = "drives", "zeros", "targets", ""
 _JITTER = 1e-8
@@ -42,6 +44,7 @@ class Variable:
     response: FloatArray = field(default_factory=lambda: np.eye(3)[None])
     steps: bool = False
     kind: str = ALONE
+    jump: str = ""
 
     def design(self, functions: FloatArray) -> FloatArray:
         """What functions (m, f) make of the positions (m, 3, k)."""
@@ -75,7 +78,20 @@ def variables(problem: DiagnosisProblem, state: ModelState, drive: FloatArray, r
     found.append(Variable("the speed", speed[:, None], "mm/s"))
     sense = np.sign(np.where(np.abs(motion.drive_rate[at]) > OPTIONS.min_drive_rate, motion.drive_rate[at], 0.0))
     found.append(Variable("the sense of motion of the drives", sense, "1", drive, steps=True))
-    return _changing(found)
+    return _changing([*found, *_jumps(problem, state, rows)])
+
+
+def _jumps(problem: DiagnosisProblem, state: ModelState, rows: BoolArray) -> Iterator[Variable]:
+    """Jumps of the instrument, of each drive and target and of all of them, as `variables`."""
+    names = drive_words(problem.mechanism).all_names
+    for jump, response in jumps(problem, state):
+        of_one = [f"a shift of {_target(site)}" for site in jump.sites if site != WORLD]
+        of_one = [f"a zero offset of {name}" for name in names] if jump.per_leg else of_one
+        parts = zip(of_one, np.split(response, len(of_one), axis=-1), strict=True) if of_one else ()
+        together = [(jump.follows, response)] if len(of_one) != 1 else []
+        for what, columns in (*together, *parts):
+            follows, value = f"{JUMP} {jump.moment:.4g} s, as {what}", jump.basis(problem.motion)[problem.at[rows]]
+            yield Variable(follows, value, "1", _columns_of_unit_size(columns[rows]), True, jump=jump.name)
 
 
 def couplings(problem: DiagnosisProblem, drive: FloatArray, rows: BoolArray) -> list[Variable]:
@@ -117,6 +133,12 @@ def _shifts_of_targets(
         reading = problem.map_of(state)
         for site in sites:
             yield site, problem.of_rows(reading.effect(site))[rows][..., :3]
+
+
+def _columns_of_unit_size(response: FloatArray) -> FloatArray:
+    """A response (m, 3, r) each of whose columns has an rms of one, or is zero."""
+    size = np.sqrt((response**2).mean(axis=(0, 1)))
+    return np.asarray(response / np.where(size > 0.0, size, 1.0))
 
 
 def _of_unit_size(response: FloatArray) -> FloatArray:

@@ -13,7 +13,7 @@ import numpy as np
 
 from rrru.arrays import FloatArray
 from rrru.diagnosis.aliases import EffectKey
-from rrru.diagnosis.discrepancy_basis import JUMPS, UNKNOWN, jump_at, target_sites
+from rrru.diagnosis.discrepancy_basis import JUMPS, UNKNOWN, Unknown, jump_at, target_sites
 from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.problem import DiagnosisProblem
 from rrru.diagnosis.state import LinearizedProblem, ModelState
@@ -32,20 +32,30 @@ def with_jumps(
     time = problem.motion.time_s[problem.at]
     if not np.isfinite(time).all():
         return problem, {}
-    known = [term for term in terms if term.effect not in UNKNOWN and not problem.library[term.effect].coordinates.broad]
+    known = [
+        term for term in terms if term.effect not in UNKNOWN and not problem.library[term.effect].coordinates.broad
+    ]
     nuisance = np.concatenate([linear.base, *signatures(problem.library, linear, known)], axis=-1)
     basis, _ = np.linalg.qr(nuisance.reshape(linear.data.size, -1))
     left = linear.data.ravel() - basis @ (basis.T @ linear.data.ravel())
     by_row = basis.reshape(*linear.data.shape, -1)
     library, columns = dict(problem.library), {}
-    for name, response in _responses(problem, linear, state):
+    for name, response in _responses(problem, state):
         moments, gains = moment_gains(left.reshape(linear.data.shape), by_row, response, time)
         if not len(moments):
             continue
-        function = jump_at(name, problem.mechanism, float(moments[gains.argmax()]), -float(np.log(len(moments))))
-        library[name] = function
-        columns[name, 0] = response * (time > function.moment)[:, None, None]
+        moment, log_prior = float(moments[gains.argmax()]), -float(np.log(len(moments)))
+        library[name] = jump_at(name, problem.mechanism, moment, log_prior)
+        columns[name, 0] = response * (time > moment)[:, None, None]
     return replace(problem, library=library), columns
+
+
+def jumps(problem: DiagnosisProblem, state: ModelState) -> Iterator[tuple[Unknown, FloatArray]]:
+    """Each jump in a problem's library, and the derivative (m, 3, c) of the readings by its coefficients."""
+    found = {name: one for name, one in problem.library.items() if name in JUMPS and isinstance(one, Unknown)}
+    for name, response in _responses(problem, state) if found else ():
+        if name in found:
+            yield found[name], response
 
 
 def moment_gains(
@@ -83,12 +93,10 @@ def moment_gains(
     return middle[least - 1 : len(stops) - least], gains
 
 
-def _responses(
-    problem: DiagnosisProblem, linear: LinearizedProblem, state: ModelState
-) -> Iterator[tuple[str, FloatArray]]:
+def _responses(problem: DiagnosisProblem, state: ModelState) -> Iterator[tuple[str, FloatArray]]:
     """Names in JUMPS and the derivative (m, 3, c) of the readings by each jump's coefficients."""
     at, names = problem.map_of(ModelState(state.deviations, {})), iter(JUMPS)
     yield next(names), problem.of_rows(at.effect(WORLD))
-    yield next(names), linear.drive
+    yield next(names), problem.of_rows(at.drive_effect)
     if sites := target_sites(problem.mechanism):
         yield next(names), np.concatenate([problem.of_rows(at.effect(site))[..., :3] for site in sites], axis=-1)

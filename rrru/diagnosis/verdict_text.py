@@ -30,6 +30,7 @@ from rrru.diagnosis.result_notes import (
     SUCCESSIVE_ALIKE,
 )
 from rrru.diagnosis.result_tables import is_off_zero
+from rrru.diagnosis.smooth_functions import JUMP
 from rrru.diagnosis.verdict import POSSIBLE
 from rrru.effects.protocol import is_per_load
 from rrru.estimation.noise_model import CONTRADICTED
@@ -170,6 +171,9 @@ def _looks_like(rows: Sequence[Facts]) -> list[str]:
             f"The unexplained part follows no single variable that was tried: {best['follows']} comes next, a smooth "
             f"function of it predicts {percent(best['explained'])} at left-out points."
         ]
+    if best["follows"].startswith(JUMP):
+        predicts = f"which predicts {percent(best['explained'])} of it at left-out points ({size})"
+        return [f"The unexplained part follows {best['follows']}, {predicts}."]
     how = "steps with" if not np.isfinite(best["scale"] or np.nan) else "a smooth function of"
     scale, unit = best["scale"], best["unit"]
     if unit == "rad" and how.startswith("a"):
@@ -391,6 +395,11 @@ def _next(facts: Facts) -> list[str]:
     if said:
         return said
     if facts["unexplained"]:
+        follows = facts["unexplained_follows"][0]["follows"] if facts["unexplained_follows"] else ""
+        if follows.startswith(JUMP):
+            moment = follows.removeprefix(JUMP).split(",")[0]
+            apart = "calibrate the readings before and after it apart"
+            return [f"Next: no run is advised, since something moved at{moment}: {apart}, or measure again."]
         where = "the table gap_locate says where the gap is largest"
         return [f"Next: no run is advised, since no effect model fits the unexplained part; {where}."]
     decided = not (facts["groups"] or facts["confounded_with"])

@@ -58,11 +58,13 @@ def _attribution(make, seed=0, count=240, calibration=_offsets):
         stop=np.arange(count),
         noise_mm=NOISE_MM,
         mechanism=ROBOT,
+        library={},
         points=pd.DataFrame({"speed_mm_s": np.full(count, 80.0)}),
         residual=lambda _state: left,
     )
     evidence = SimpleNamespace(linear=LinearizedProblem(left, calibration(motion), {}, {}, {}, response))
-    return SimpleNamespace(problem=problem, evidence=evidence, state=None)
+    posterior = SimpleNamespace(best=lambda: (SimpleNamespace(effects=frozenset()), 0))
+    return SimpleNamespace(problem=problem, evidence=evidence, posterior=posterior, state=None)
 
 
 _MADE = {
