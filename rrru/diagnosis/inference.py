@@ -413,7 +413,7 @@ class _Linearization:
         terms: Sequence[EffectTerm] = (),
         noise_again: bool = False,
     ) -> tuple[DiagnosisProblem, LinearizedProblem, str]:
-        """Problem with harmonics, jumps and noise, its linearisation at a state with hypothesis terms, source of the noise.
+        """Problem with harmonics, jumps and noise, its linearisation at a state with terms, source of the noise.
 
         noise_again: whether the noise that was found about another state does not hold at this one.
         """

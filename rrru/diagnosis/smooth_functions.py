@@ -3,9 +3,9 @@
 A function f of a drive's value, or of the time, is added to the drive and moves the positions by J f (J: derivative by
 the drive). So is a function of another drive's value: two drives are coupled. Or it is a function of the place, the
 time, the payload or the speed for each axis, of the time for each axis of the platform and one target, steps with the
-sense of motion of the drives, or a jump at the moment that `rrru.diagnosis.time_jumps` has found. A function is a Gaussian process of covariance a^2 exp(-d^2 / (2 l^2)) of the
-distance d, by its values at inducing points (C. Rasmussen and C. Williams, Gaussian Processes for Machine
-Learning, 2006, sec. 8.3).
+sense of motion of the drives, or a jump at the moment that `rrru.diagnosis.time_jumps` has found. A function is a
+Gaussian process of covariance a^2 exp(-d^2 / (2 l^2)) of the distance d, by its values at inducing points (C.
+Rasmussen and C. Williams, Gaussian Processes for Machine Learning, 2006, sec. 8.3).
 """
 
 from collections.abc import Iterable, Iterator
