@@ -14,6 +14,7 @@ from rrru.diagnosis.budget import budget
 from rrru.diagnosis.design.advise import Advice, advise
 from rrru.diagnosis.design.run_limits import StatedLimits
 from rrru.diagnosis.determined import few_readings, require_determined
+from rrru.diagnosis.discrepancy_basis import JUMPS
 from rrru.diagnosis.discrepancy_bias import discrepancy_covariance
 from rrru.diagnosis.drive_functions import drive_functions
 from rrru.diagnosis.inference import (
@@ -284,7 +285,7 @@ def _decide(
     worse than the verdict without it, by more than chance, is ruled out, and the others are decided again. Where
     something is unexplained an effect may be a part of that: it has to predict them better, and to make more than a
     small part of the gap, to be named. One that is too small for a name stays in the model where it predicts left-out
-    points better.
+    points better. Both are asked with the jumps that act; the model that is given has none.
     """
     ruled_out: set[str] = set()
     small: frozenset[str] = frozenset()
@@ -293,11 +294,13 @@ def _decide(
         if inference.lacks_fit:
             inference = inference.with_posterior(inference.posterior.all_unexplained())
         verdict = decide(inference.posterior, inference.problem.effects, small)
-        fitted = with_effects(inference, (*verdict.effects, *(name for name in unnamed if name not in ruled_out)))
+        names = (*verdict.effects, *(name for name in unnamed if name not in ruled_out))
+        jumps = inference.hypothesis.effects & JUMPS.keys() if verdict.unexplained else ()
+        fitted = with_effects(inference, (*names, *jumps))
         least = OPTIONS.max_heldout_loss_nats if verdict.unexplained else -OPTIONS.max_heldout_loss_nats
         worse = {name for name, gain in _gains(fitted).items() if gain < least}
         if not worse:
-            ordered = order_by_share(fitted)
+            ordered = tuple(one for one in order_by_share(fitted) if one[0].effect not in JUMPS)
             shares = {term.effect: share for term, share in ordered}
             # decided once, with all effects fitted: an effect that is left out would be a part of the remainder
             if not small and (small := _small(fitted, verdict)):
@@ -308,7 +311,7 @@ def _decide(
                 unnamed = tuple(name for name in unnamed if shares.get(name, 0.0) > 0.0)
                 continue
             named = tuple(term.effect for term, _ in ordered if term.effect in verdict.effects)
-            return replace(verdict, effects=named), fitted, ordered
+            return replace(verdict, effects=named), with_effects(fitted, names), ordered
         ruled_out |= worse
         inference = inference.with_posterior(_without(inference, ruled_out, worse, prior))
 
@@ -320,8 +323,13 @@ def _small(inference: InferenceResult, verdict: Verdict) -> frozenset[str]:
         return frozenset()
     hypothesis, level = inference.hypothesis, inference.level
     shares = inference.held_out.shares(hypothesis.terms, hypothesis.prior_scales[level], level)
+    jumped = [shares.pop(name) for name in JUMPS.keys() & shares.keys()]
+    if jumped and not level:
+        # nothing else is unexplained, and no effect is a part of a jump
+        return frozenset()
     losses, least = losses_without(inference), OPTIONS.min_share_with_unexplained
-    found = {name for name, share in shares.items() if min(share, losses[name]) < least}
+    rest = max(1.0 - sum(jumped), 1e-12)
+    found = {name for name, share in shares.items() if min(share / rest, losses[name]) < least}
     residual = inference.problem.residual(inference.calibrated)[inference.problem.on_robot]
     gap_mm = float(np.sqrt((residual**2).sum(axis=1).mean()))
     alike, left_mm = followed_alike(inference, remainder_rows(inference), tuple(shares))
@@ -354,4 +362,4 @@ def _gains(inference: InferenceResult) -> dict[str, float]:
     """Log predictive score that each effect of the hypothesis gains on left-out points over the others."""
     terms, level = inference.hypothesis.terms, inference.level
     gains = inference.held_out.gains(terms, inference.hypothesis.prior_scales[level], level)
-    return {term.effect: gain for term, gain in zip(terms, gains, strict=True)}
+    return {term.effect: gain for term, gain in zip(terms, gains, strict=True) if term.effect not in JUMPS}

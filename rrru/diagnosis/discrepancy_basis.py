@@ -15,12 +15,15 @@ import numpy as np
 from numpy.polynomial import chebyshev
 
 from rrru.arrays import FloatArray
-from rrru.effects.protocol import Contribution, Coordinates, Effect, Motion
+from rrru.effects.backlash import play
+from rrru.effects.protocol import PATH, Contribution, Coordinates, Effect, Motion
 from rrru.kinematics.legs import TOOL, WORLD
 from rrru.kinematics.robot import Robot
 
 # a frame that turns moves what is so far from the robot's as much as its shift does
 _TURNED_ABOUT_MM = 1000.0
+# backlash of this width is the sense alone; above the rounding of drive values
+_SMALLEST_WIDTH = 1e-6
 _DRIVE_ORDERS, _TIME_ORDERS = (1, 2, 3, 4, 5, 6), (1, 2, 3)
 
 
@@ -120,6 +123,19 @@ def _of_load(motion: Motion) -> FloatArray:
     return np.asarray(load[:, None] * _of_place(motion))
 
 
+def _of_sense(motion: Motion) -> FloatArray:
+    """The sense (n, K, 1) in which each drive has arrived, -1 or 1, 0 where both are as probable."""
+    arrived = -play(np.ascontiguousarray(motion.path_drive), np.full(motion.drive.shape[1], _SMALLEST_WIDTH))
+    sense = arrived[motion.path_index] / _SMALLEST_WIDTH
+    return motion.with_approach(sense, np.ones(sense.shape[1]))[..., None]
+
+
+def _of_rate(motion: Motion) -> FloatArray:
+    """Speed (n, K, 2) of each drive, of unit size, and its square with the sense."""
+    rate = motion.drive_rate / np.maximum(np.nanmax(np.abs(motion.drive_rate), axis=0), 1e-9)
+    return np.stack([rate, rate * np.abs(rate)], axis=-1)
+
+
 def _after(motion: Motion, moment: float) -> FloatArray:
     """A function (n, 1) that is 0 up to a moment in s, 1 after it, and NaN where the time is not known."""
     return np.where(np.isfinite(motion.time_s), motion.time_s > moment, np.nan)[:, None]
@@ -154,6 +170,8 @@ _SMOOTH = {
         ),
         Unknown("unknown_place", "the place", _of_place, 10, ()),
         Unknown("unknown_load", "the payload", _of_load, 10, ("payload_kg",)),
+        Unknown("unknown_sense", "the sense of motion of the drives", _of_sense, 1, (PATH,), True, 1e-4),
+        Unknown("unknown_rate", "the speeds of the drives", _of_rate, 2, ("drive_rate",), True, 1e-4),
     )
 }
 UNKNOWN = _SMOOTH | JUMPS
