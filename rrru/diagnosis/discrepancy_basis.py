@@ -126,7 +126,7 @@ def _of_load(motion: Motion) -> FloatArray:
 def _of_sense(motion: Motion) -> FloatArray:
     """The sense (n, K, 1) in which each drive has arrived, -1 or 1, 0 where both are as probable."""
     arrived = -play(np.ascontiguousarray(motion.path_drive), np.full(motion.drive.shape[1], _SMALLEST_WIDTH))
-    sense = arrived[motion.path_index] / _SMALLEST_WIDTH
+    sense = np.clip(arrived[motion.path_index] / _SMALLEST_WIDTH, -1.0, 1.0)
     return motion.with_approach(sense, np.ones(sense.shape[1]))[..., None]
 
 

@@ -22,7 +22,7 @@ from scipy.special import logsumexp
 from rrru.arrays import FloatArray
 from rrru.diagnosis.model_fit import ModelFit, whitening_of
 from rrru.diagnosis.options import OPTIONS
-from rrru.diagnosis.smooth_functions import OF_DRIVES, OF_ZEROS, Regression, Variable, process, variables
+from rrru.diagnosis.smooth_functions import OF_DRIVES, OF_RATES, OF_ZEROS, Regression, Variable, process, variables
 from rrru.diagnosis.state import RANK_TOLERANCE
 from rrru.estimation.estimate import Estimate
 from rrru.estimation.noise_model import Whitening
@@ -140,7 +140,10 @@ def _designs(fit: ModelFit) -> Iterator[FloatArray]:
     # of positions on the robot alone; errors of drives turn the platform as well
     mask = problem.on_robot[:, None, None]
     for kind, group in groupby(found, key=lambda one: one.kind or one.follows):
-        some = [one if kind in (OF_DRIVES, OF_ZEROS) else replace(one, response=one.response * mask) for one in group]
+        some = [
+            one if kind in (OF_DRIVES, OF_ZEROS, OF_RATES) else replace(one, response=one.response * mask)
+            for one in group
+        ]
         if some[0].steps:
             yield some[0].design(some[0].value)
             continue

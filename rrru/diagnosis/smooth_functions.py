@@ -1,10 +1,10 @@
 """Functions of one variable that an error may follow: a drive's value, the time, the place, the load, the motion.
 
-A function f of a drive's value, or of the time, is added to the drive and moves the positions by J f (J: derivative by
-the drive). So is a function of another drive's value: two drives are coupled. Or it is a function of the place, the
-time, the payload or the speed for each axis, of the time for each axis of the platform and one target, steps with the
-sense of motion of the drives, or a jump at the moment that `rrru.diagnosis.time_jumps` has found. A function is a
-Gaussian process of covariance a^2 exp(-d^2 / (2 l^2)) of the distance d, by its values at inducing points (C.
+A function f of a drive's value or speed, or of the time, is added to the drive and moves the positions by J f (J:
+derivative by the drive). So is a function of another drive's value: two drives are coupled. Or it is a function of the
+place, the time, the payload or the speed for each axis, of the time for each axis of the platform and one target, steps
+with the sense of motion of the drives, or a jump at the moment that `rrru.diagnosis.time_jumps` has found. A function
+is a Gaussian process of covariance a^2 exp(-d^2 / (2 l^2)) of the distance d, by its values at inducing points (C.
 Rasmussen and C. Williams, Gaussian Processes for Machine Learning, 2006, sec. 8.3).
 """
 
@@ -27,7 +27,7 @@ from rrru.robots.drive_words import drive_words
 TIME = "the time"
 JUMP = "a jump at"
 # kinds of variables that are alike: one for every drive, or target
-OF_DRIVES, OF_ZEROS, OF_TARGETS, ALONE = "drives", "zeros", "targets", ""
+OF_DRIVES, OF_ZEROS, OF_RATES, OF_TARGETS, ALONE = "drives", "zeros", "rates", "targets", ""
 _JITTER = 1e-8
 
 
@@ -66,6 +66,10 @@ def variables(problem: DiagnosisProblem, state: ModelState, drive: FloatArray, r
     found += [
         Variable(f"{TIME}, as a zero offset of {name}", time_s, "s", response, kind=OF_ZEROS)
         for name, response in zip(names, responses, strict=False)
+    ]
+    found += [
+        Variable(f"the speed of {name}", motion.drive_rate[at][:, k : k + 1], f"{unit}/s", response, kind=OF_RATES)
+        for k, (name, unit, response) in enumerate(zip(names, problem.mechanism.parts.units, responses, strict=False))
     ]
     found.append(Variable("the place", motion.position_mm[at], "mm"))
     found.append(Variable(TIME, time_s, "s"))
