@@ -158,7 +158,7 @@ def with_noise(
     over_noise = None if prior_sd is None else prior_sd / model.mean_mm
     stops = alike(data, columns, problem.stop[complete], problem.kind[complete], over_noise)
     model = replace(model, alike=stops)
-    repeated = noise.quieter_repeats(problem.measurements[problem.used], model.mean_mm, model.correlation)
+    repeated = noise.quieter_repeats(problem.measurements[problem.used], model.mean_mm, model.correlation, model.offset)
     if repeated is not None:
         return problem.under(model.of_size(repeated)), REPEATS
     return problem.under(model), "fitted"
