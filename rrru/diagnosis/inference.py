@@ -478,7 +478,7 @@ def _rounds(problem: DiagnosisProblem, calibrated: ModelState, prior: Prior, sta
             # nonlinear on the way there, or the shape of an effect is still to be fitted
             settled = discrepant and small and not shaped
             # try the effect models before the discrepancy basis
-            named = posterior.best_of(hypothesis.effects - set(UNKNOWN)) if discrepant and (small or shaped) else None
+            named = posterior.best_where(bool) if discrepant and (small or shaped) else None
             tried, its_level = named or (hypothesis, level)
             ended = frozenset(hypothesis.terms) in seen or not hypothesis.terms
             ended |= settled and (tried is hypothesis or not tried.terms)
