@@ -478,7 +478,7 @@ def _rounds(problem: DiagnosisProblem, calibrated: ModelState, prior: Prior, sta
             # nonlinear on the way there, or the shape of an effect is still to be fitted
             settled = discrepant and small and not shaped
             # try the effect models before the discrepancy basis
-            named = posterior.best_where(bool) if discrepant and (small or shaped) else None
+            named = posterior.best_of(hypothesis.effects - set(UNKNOWN)) if discrepant and (small or shaped) else None
             tried, its_level = named or (hypothesis, level)
             ended = frozenset(hypothesis.terms) in seen or not hypothesis.terms
             ended |= settled and (tried is hypothesis or not tried.terms)
@@ -514,7 +514,10 @@ def _rounds(problem: DiagnosisProblem, calibrated: ModelState, prior: Prior, sta
     result = with_effects(result, hypothesis.effects)
     for name in sorted(hypothesis.effects):
         if not result.hypothesis.effects.isdisjoint(HOLDS.get(name, ())):
-            result = _about_the_special_case(result, prior, name)
+            result = _about_another_mode(result, prior, result.hypothesis.effects - {name})
+    named = result.posterior.best_where(bool)
+    if named and not result.hypothesis.effects.isdisjoint(UNKNOWN):
+        result = _about_another_mode(result, prior, named[0].effects)
     return result
 
 
@@ -537,23 +540,24 @@ def _with_hidden_offsets(inference: InferenceResult, prior: Prior, stated_mm: fl
     return found if found.log_likelihood - cost > inference.log_likelihood else inference
 
 
-def _about_the_special_case(inference: InferenceResult, prior: Prior, general: str) -> InferenceResult:
-    """The inference, or the one about the fit without an effect that holds another one of the hypothesis, if higher.
+def _about_another_mode(inference: InferenceResult, prior: Prior, effects: Collection[str]) -> InferenceResult:
+    """The inference, or the one about the fit of some effects alone, if higher.
 
-    Together the two can make up for a linearisation that is wrong for the special case alone, as where a stop moves a
-    drive by less than its backlash, and a linearisation about both then keeps both. The evidence is an expansion about
-    a mode of the posterior (Tierney and Kadane, Accurate approximations for posterior moments and marginal densities,
-    Journal of the American Statistical Association 81, 1986): of several modes the highest one counts.
+    An effect and one that holds it as a special case, or a function of the discrepancy, can make up for a linearisation
+    that is wrong for the effect alone, as where a stop moves a drive by less than its backlash, and a linearisation
+    about both then keeps both. The evidence is an expansion about a mode of the posterior (Tierney and Kadane, Accurate
+    approximations for posterior moments and marginal densities, Journal of the American Statistical Association 81,
+    1986): of several modes the highest one counts.
     """
-    special = with_effects(inference, inference.hypothesis.effects - {general})
+    other = with_effects(inference, effects)
     try:
-        problem = special.problem.standing(special.state).with_approach(special.state)
-        evidence = problem.evidence(problem.linearise(special.state))
+        problem = other.problem.standing(other.state).with_approach(other.state)
+        evidence = problem.evidence(problem.linearise(other.state))
     except FitError:
         return inference
     space = ModelSpace(evidence.on_library(), prior)
-    posterior = space.confirmed(space.climb(special.hypothesis.terms))
+    posterior = space.confirmed(space.climb(other.hypothesis.terms))
     if posterior.height <= inference.posterior.height:
         return inference
-    found = replace(special, problem=problem, evidence=evidence).with_posterior(posterior)
+    found = replace(other, problem=problem, evidence=evidence).with_posterior(posterior)
     return with_effects(found, found.hypothesis.effects)
