@@ -14,7 +14,7 @@ from rrru.diagnosis.budget import budget
 from rrru.diagnosis.design.advise import Advice, advise
 from rrru.diagnosis.design.run_limits import StatedLimits
 from rrru.diagnosis.determined import few_readings, require_determined
-from rrru.diagnosis.discrepancy_basis import JUMPS
+from rrru.diagnosis.discrepancy_basis import JUMPS, UNKNOWN
 from rrru.diagnosis.discrepancy_bias import discrepancy_covariance
 from rrru.diagnosis.drive_functions import drive_functions
 from rrru.diagnosis.inference import (
@@ -285,7 +285,7 @@ def _decide(
     worse than the verdict without it, by more than chance, is ruled out, and the others are decided again. Where
     something is unexplained an effect may be a part of that: it has to predict them better, and to make more than a
     small part of the gap, to be named. One that is too small for a name stays in the model where it predicts left-out
-    points better. Both are asked with the jumps that act; the model that is given has none.
+    points better. Both are asked with the one jump that acts; the model that is given has none.
     """
     ruled_out: set[str] = set()
     small: frozenset[str] = frozenset()
@@ -295,8 +295,10 @@ def _decide(
             inference = inference.with_posterior(inference.posterior.all_unexplained())
         verdict = decide(inference.posterior, inference.problem.effects, small)
         names = (*verdict.effects, *(name for name in unnamed if name not in ruled_out))
-        jumps = inference.hypothesis.effects & JUMPS.keys() if verdict.unexplained else ()
-        fitted = with_effects(inference, (*names, *jumps))
+        unknown = inference.hypothesis.effects & UNKNOWN.keys()
+        # several functions together are no jump but something else
+        jump = unknown & JUMPS.keys() if verdict.unexplained and len(unknown) == 1 else ()
+        fitted = with_effects(inference, (*names, *jump))
         least = OPTIONS.max_heldout_loss_nats if verdict.unexplained else -OPTIONS.max_heldout_loss_nats
         worse = {name for name, gain in _gains(fitted).items() if gain < least}
         if not worse:
