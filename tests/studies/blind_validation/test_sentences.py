@@ -139,6 +139,7 @@ _CASES = [
         ({"lacking": "1", "used": "126"}, {}, _FACTS),
     ),
     ("the noise is larger", ({}, _UNKNOWN, _OUTSIDE), ({}, {}, _FACTS)),
+    ("no cause is found but an error", ({}, _UNKNOWN, _NONE), ({}, {}, _NONE)),
     ("it looks random and repeats", ({}, _UNKNOWN, _OUTSIDE), ({}, {}, _FACTS)),
     ("it looks random and is correlated", ({}, _UNKNOWN, _OUTSIDE), ({}, {}, _FACTS)),
     ("successive residuals are correlated", ({}, _UNKNOWN, _OUTSIDE), ({}, {}, _FACTS)),

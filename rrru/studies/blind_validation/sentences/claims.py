@@ -39,11 +39,14 @@ class Claim:
     stated: dict = field(default_factory=dict)
 
 
+_NOISE = rf"noise(?: that was found)? is {_Y} mm(?: \(stated: {_NUMBER} mm in space\))?"
 # kinds of sentences of the answer
 _SENTENCES = {
     "the robot still misses by": rf"After calibration the residual error is {_X} mm at points left out of it .*",
     "nothing systematic is left": rf"After calibration these data show no systematic error \(probability {_P}\): "
-    rf"the residual error is {_X} mm, the measuring noise is {_Y} mm\.",
+    rf"the residual error is {_X} mm, the (?:measuring )?{_NOISE}\.",
+    "no cause is found but an error": rf"After calibration no cause is found \(probability {_P}\), but the model "
+    rf"lacks an error: the residual error is {_X} mm, the {_NOISE}\.",
     "no cause is named": r"No cause is named: .*\.",
     "what to check": r"Next: check units, signs and order of the drives, .*",
     "the corrected file is worse": r"The corrected file has a residual error of .*",
@@ -74,7 +77,7 @@ _SENTENCES = {
     "but .*",
     "it looks random and repeats": rf"(?:{_SHARE}|An undetermined share|Some of it) looks like random error\..*",
     "what is left with it": rf"With {_MODEL} in the simulator the residual error at left-out points is {_X} mm; "
-    rf"the noise(?: that was found)? is {_Y} mm(?: \(stated: {_NUMBER} mm in space\))?\.",
+    rf"the {_NOISE}\.",
     "that it shrinks cannot be seen": r"That it shrinks cannot be seen at these points: .*",
     "these data cannot rule out": r"(?:These data cannot rule out|Parts of the unexplained share could be): "
     r"(?P<names>.*)\.",

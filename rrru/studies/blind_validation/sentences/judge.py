@@ -417,6 +417,7 @@ _JUDGES = {
     "fitted without some points": lambda stated, t, _: int(stated["lacking"]) < int(stated["used"]) <= t.rows,
     # only errors outside every model, as those of MuJoCo's servos, make it look larger
     "the noise is larger": lambda _, t, __: t.outside or t.still_mm > _OWN * t.noise_rms_mm,
+    "no cause is found but an error": lambda _, t, __: t.outside or t.still_mm > _OWN * t.noise_rms_mm,
     "it looks random and repeats": lambda _, t, __: t.outside or t.still_mm > _OWN * t.noise_rms_mm,
     "it looks random and is correlated": lambda _, t, __: t.outside or t.still_mm > _OWN * t.noise_rms_mm,
     "successive residuals are correlated": lambda _, t, __: t.outside or t.still_mm > _OWN * t.noise_rms_mm,
