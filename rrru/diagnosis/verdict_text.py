@@ -48,6 +48,7 @@ _NOT_ALL = "More acts than the named causes, and no further one is probable enou
 _NO_SIZE = "Its size is not determined, because no masses of the links are stated."
 # what looks like random error above the stated noise, by the note on repeated poses; else it does not repeat
 _ABOVE_NOISE = "is random error above the stated noise. Repeatability is unknown:"
+_OR_UNEXPLAINED = _ABOVE_NOISE.replace(".", ", or a part of what is unexplained.", 1)
 _RANDOM = {
     # the first one that applies
     SUCCESSIVE_ALIKE: "looks like random error, but residuals of successive stops are correlated: it is an error that "
@@ -57,7 +58,7 @@ _RANDOM = {
     ROBOT_REPEATS: "looks like random error. Poses that were measured again agree better: it is an error that the "
     "model lacks.",
 }
-# the notes that say so
+# the notes on what is no random error
 _NOT_RANDOM = (SUCCESSIVE_ALIKE, ROBOT_REPEATS)
 _DOES_NOT_REPEAT = "does not repeat from pass to pass, in the robot or in the instrument: no model can correct it."
 
@@ -317,6 +318,9 @@ def _scatter(facts: Facts) -> list[str]:
     if share < OPTIONS.min_mentioned_share:
         return []
     how = next((text for note, text in _RANDOM.items() if note in facts["notes"]), _DOES_NOT_REPEAT)
+    if facts["unexplained"]:
+        # a step, as of a target that slips once, is no smooth discrepancy and passes in part for noise
+        how = how.replace(_ABOVE_NOISE, _OR_UNEXPLAINED)
     if not _shares_are_determined(facts):
         return [f"Some of it {how}"]
     # the interval of a sum is not known

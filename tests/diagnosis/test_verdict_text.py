@@ -365,6 +365,19 @@ def test_a_noise_that_contradicts_the_stated_one_is_said_to_be_found(stated, sai
     assert said in " ".join(answered(noise_stated_mm=stated)["sentences"])
 
 
+@pytest.mark.parametrize("note", [REPEATABILITY_UNKNOWN, REPEATABILITY_UNSURE])
+@pytest.mark.parametrize("unexplained", [True, False])
+def test_random_error_may_be_a_part_of_what_is_unexplained(unexplained, note):
+    """Of a reflector that slipped once 30 to 46 % was "random error", which did not act at all."""
+    effects = "link_flexure+unexplained" if unexplained else "link_flexure"
+    (said,) = (one for one in answered(effects=effects, notes=note)["sentences"] if "random error" in one)
+    words = "is random error above the stated noise, or a part of what is unexplained. Repeatability is unknown: "
+    assert (words in said) == unexplained
+    assert ("is random error above the stated noise. Repeatability is unknown: " in said) != unexplained
+    (kind, *_) = (claim.kind for claim in claims._of_text(said, claims._SENTENCES))
+    assert kind == ("it is random error or unexplained" if unexplained else "it is random error")
+
+
 @pytest.mark.parametrize(
     ("notes", "said"),
     [

@@ -18,6 +18,7 @@ _HINGES = np.stack([-np.sin(_ANGLES), np.cos(_ANGLES), np.zeros(3)], axis=1)
 _BASE = np.array([[300.0], [310.0], [295.0]]) * _AROUND
 _PLATE = np.array([[140.0], [150.0], [145.0]]) * _AROUND - [0.0, 0.0, 20.0]
 _TARGETS = {"a": [90.0, 10.0, 30.0], "b": [-60.0, 80.0, 35.0], "c": [-50.0, -85.0, 45.0]}
+_TRACKER_MM = np.array([3100.0, 3900.0, -700.0])
 _HOME = np.array([0.0, 0.0, _HEIGHT_MM, 0.0, 0.0, 0.0])
 
 
@@ -54,7 +55,8 @@ def _model():
         legs.append(
             f'<body name="leg{k}" pos="{foot}" xyaxes="{across}"><joint name="hinge{k}" axis="0 1 0"/>'
             f'<geom size="0.02" mass="1"/><body name="rod{k}" pos="0 0 {length / 1e3}">'
-            f'<joint name="slide{k}" type="slide" axis="0 0 1" range="-0.1 0.1"/><geom size="0.02" mass="1"/></body></body>'
+            f'<joint name="slide{k}" type="slide" axis="0 0 1" range="-0.1 0.1"/><geom size="0.02" mass="1"/>'
+            "</body></body>"
         )
         balls.append(f'<connect body1="rod{k}" body2="plate" anchor="0 0 0"/>')
     servos = "".join(f'<position joint="slide{k}" kp="5e7"/>' for k in (1, 2, 3))
@@ -80,7 +82,7 @@ def _table():
     for number, values in enumerate(stroke):
         pose = _pose(home + values + [0.5, -0.4, 0.3])
         for name, place in _TARGETS.items():
-            seen = frame.apply(pose[:3] + Rotation.from_rotvec(pose[3:]).apply(place)) + [3100.0, 3900.0, -700.0]
+            seen = frame.apply(pose[:3] + Rotation.from_rotvec(pose[3:]).apply(place)) + _TRACKER_MM
             rows.append((25.0 * number, name, *values, *(seen + _NOISE_MM * generator.standard_normal(3))))
     slides = [f"slide{k}_mm" for k in (1, 2, 3)]
     return pd.DataFrame(rows, columns=["time_s", "target", *slides, *(f"measured_{axis}_mm" for axis in "xyz")])

@@ -109,6 +109,7 @@ _CASES = [
     ("probability of this answer", ({}, {}, _FACTS), ({}, {}, _OUTSIDE)),
     ("probability", ({}, {}, _FACTS), ({}, {}, _NONE)),
     ("it does not repeat", ({"share": "0"}, {}, _FACTS), ({"share": "14"}, {}, _FACTS)),
+    ("it is random error or unexplained", ({"share": "5"}, _UNKNOWN, _OUTSIDE), ({}, {}, _FACTS)),
     ("it is random error", ({"share": "0"}, {}, _FACTS), ({}, {}, _FACTS)),
     ("what is left with it", ({"value": "0.011"}, {}, _FACTS), ({"value": "0.05"}, {}, _FACTS)),
     ("that it shrinks cannot be seen", ({}, {"before_mm": 0.02}, _FACTS), ({}, {}, _FACTS)),

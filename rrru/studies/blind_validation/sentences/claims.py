@@ -72,6 +72,8 @@ _SENTENCES = {
     "probability of this answer": rf"(?:Probability that it acts: (?P<each>.*)\. )?Probability of (?:exactly )?"
     rf"(?:this answer|the causes of the corrected model)(?:, alone or with further causes)?: {_P}\.",
     "it does not repeat": rf"(?:{_SHARE}|An undetermined share|Some of it) does not repeat from pass to pass.*",
+    "it is random error or unexplained": rf"(?:{_SHARE}|An undetermined share|Some of it) is random error above the "
+    r"stated noise, or a part of what is unexplained\..*",
     "it is random error": rf"(?:{_SHARE}|An undetermined share|Some of it) is random error above the stated noise.*",
     "it looks random and is correlated": rf"(?:{_SHARE}|An undetermined share|Some of it) looks like random error, "
     "but .*",

@@ -403,6 +403,7 @@ _JUDGES = {
     "more acts": _more,
     "probability of this answer": _probability,
     "it does not repeat": _scatter,
+    "it is random error or unexplained": lambda stated, t, facts: t.outside or _scatter(stated, t, facts),
     "it is random error": _scatter,
     "what is left with it": lambda stated, t, _: _sized(stated["value"], t.after_mm, t, t.rows, t.after_error_mm2),
     "that it shrinks cannot be seen": lambda _, t, __: t.before_mm < t.noise_rms_mm,
