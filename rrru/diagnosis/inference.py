@@ -305,12 +305,16 @@ def _best_shapes(linear: LinearizedProblem, blocks: dict[EffectKey, FloatArray])
 def _few(problem: DiagnosisProblem, calibrated: ModelState) -> tuple[LinearizedProblem, FloatArray]:
     """The linearisation about a calibration, and the columns (m, 3, k) of all effects with few coefficients.
 
-    Where these would leave less than a third of the numbers free, the calibration's columns alone.
+    Where these would leave less than a third of the numbers free, those of each effect in the best shape alone. Where
+    these would, too, the calibration's columns alone.
     """
     few = {name: effect for name, effect in problem.library.items() if not effect.coordinates.broad}
     linear = replace(problem, library=few).linearise(calibrated)
-    columns = np.concatenate([linear.base, *linear.columns.values()], axis=-1)
-    return linear, (columns if columns.shape[-1] <= 2 * len(problem) else linear.base)
+    for blocks in (linear.columns, _best_shapes(linear, linear.columns)):
+        columns = np.concatenate([linear.base, *blocks.values()], axis=-1)
+        if columns.shape[-1] <= 2 * len(problem):
+            return linear, columns
+    return linear, linear.base
 
 
 def infer(problem: DiagnosisProblem, prior: Prior, stated: str = KNOWN) -> InferenceResult:

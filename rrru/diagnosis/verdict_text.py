@@ -49,6 +49,7 @@ _NOT_ALL = "More acts than the named causes, and no further one is probable enou
 _NO_SIZE = "Its size is not determined, because no masses of the links are stated."
 # what looks like random error above the stated noise, by the note on repeated poses; else it does not repeat
 _ABOVE_NOISE = "is random error above the stated noise. Repeatability is unknown:"
+_OR_UNEXPLAINED = _ABOVE_NOISE.replace(".", ", or a part of what is unexplained.", 1)
 _RANDOM = {
     # the first one that applies
     SUCCESSIVE_ALIKE: "looks like random error, but residuals of successive stops are correlated: it is an error that "
@@ -58,6 +59,8 @@ _RANDOM = {
     ROBOT_REPEATS: "looks like random error. Poses that were measured again agree better: it is an error that the "
     "model lacks.",
 }
+# the notes on what is no random error
+_NOT_RANDOM = (SUCCESSIVE_ALIKE, ROBOT_REPEATS)
 _DOES_NOT_REPEAT = "does not repeat from pass to pass, in the robot or in the instrument: no model can correct it."
 
 
@@ -100,14 +103,23 @@ def _no_answer(facts: Facts) -> str:
 
 def _missed(facts: Facts) -> str:
     """Residual error of the calibrated robot at points that its calibration has not used."""
-    gap, noise = (rounded(facts[name]) for name in ("gap_rms_mm", "noise_rms_mm"))
+    gap = rounded(facts["gap_rms_mm"])
     if facts["effects"] or facts["unexplained"]:
         return f"After calibration the residual error is {gap} mm at points left out of it (noise subtracted)."
     sure = probability(facts["probability"])
-    return (
-        f"After calibration these data show no systematic error (probability {sure}): "
-        f"the residual error is {gap} mm, the measuring noise is {noise} mm."
-    )
+    if any(note in facts["notes"] for note in _NOT_RANDOM) and _scatter(facts):
+        answer = f"no cause is found (probability {sure}), but the model lacks an error"
+    else:
+        answer = f"these data show no systematic error (probability {sure})"
+    return f"After calibration {answer}: the residual error is {gap} mm, the {_noise(facts, 'measuring ')}."
+
+
+def _noise(facts: Facts, kind: str = "") -> str:
+    """The noise, "noise is 0.035 mm" with its kind before it, or both noises where it contradicts the stated one."""
+    found, stated = facts["noise_rms_mm"], np.sqrt(3.0) * (facts["noise_stated_mm"] or np.nan)
+    if found > CONTRADICTED * stated:
+        return f"noise that was found is {rounded(found)} mm (stated: {rounded(stated)} mm in space)"
+    return f"{kind}noise is {rounded(found)} mm"
 
 
 def _causes(facts: Facts) -> list[str]:
@@ -310,6 +322,9 @@ def _scatter(facts: Facts) -> list[str]:
     if share < OPTIONS.min_mentioned_share:
         return []
     how = next((text for note, text in _RANDOM.items() if note in facts["notes"]), _DOES_NOT_REPEAT)
+    if facts["unexplained"]:
+        # a step, as of a target that slips once, is no smooth discrepancy and passes in part for noise
+        how = how.replace(_ABOVE_NOISE, _OR_UNEXPLAINED)
     if not _shares_are_determined(facts):
         return [f"Some of it {how}"]
     # the interval of a sum is not known
@@ -326,16 +341,10 @@ def _scatter_parts(facts: Facts, least: float = 0.0) -> list[Facts]:
 
 def _left(facts: Facts) -> list[str]:
     """Residual error with the effects in the simulator, and whether left-out points show that it is smaller."""
-    after, noise = (rounded(facts[name]) for name in ("gap_after_rms_mm", "noise_rms_mm"))
     named = {0: "", 1: "it"}.get(len(facts["effects"]), "them")
     further = f"possible further causes ({', '.join(map(readable, facts['unnamed']))})" if facts["unnamed"] else ""
     what = " and ".join(filter(None, (named, further)))
-    found, stated = "", np.sqrt(3.0) * (facts["noise_stated_mm"] or np.nan)
-    if facts["noise_rms_mm"] > CONTRADICTED * stated:
-        found, noise = " that was found", f"{noise} mm (stated: {rounded(stated)} mm in space)"
-    else:
-        noise = f"{noise} mm"
-    size = f"{after} mm; the noise{found} is {noise}"
+    size = f"{rounded(facts['gap_after_rms_mm'])} mm; the {_noise(facts)}"
     said = [f"With {what} in the simulator the residual error at left-out points is {size}."]
     if facts["gap_rms_mm"] <= facts["gap_after_rms_mm"] and facts["gap_rms_mm"] < facts["noise_rms_mm"]:
         said.append("That it shrinks cannot be seen at these points: it is too small relative to the noise.")

@@ -17,6 +17,8 @@ _PITCH = np.array([0.0, 0.0, 0.0, 0.0, 0.5 * np.pi, 0.0])
 _AXES = np.array([[0, 0, 1], [0, 1, 0], [0, 1, 0], [1, 0, 0], [0, 1, 0], [1, 0, 0]], dtype=float)
 _MASS_KG = np.array([11.0, 9.5, 5.0, 3.8, 1.6, 0.3])
 _CENTRE_MM = np.array([[20, 0, 110], [0, 50, 240], [40, -20, 30], [-120, 0, 0], [15, 0, 0], [-10, 0, 0]], dtype=float)
+# the instrument's frame
+FRAME = Rotation.from_rotvec([0.1, -0.2, 0.7])
 _LOW, _HIGH = np.array([-1.2, -0.6, -1.2, -2.2, -1.5, -2.5]), np.array([1.2, 1.0, 0.6, 2.2, 1.5, 2.5])
 
 
@@ -53,7 +55,7 @@ def table(drive, places, generator, **columns):
     places: by reflector's name its position and turn, (n, 3) and (n, 3, 3) of the flange, and place (3,) or (n, 3) on
     it; columns: others of the table (n,).
     """
-    frame, tables = Rotation.from_rotvec([0.1, -0.2, 0.7]).as_matrix(), []
+    frame, tables = FRAME.as_matrix(), []
     for number, (name, (position, turn, place)) in enumerate(places.items()):
         on_flange = np.broadcast_to(place, position.shape)
         seen = (position + np.einsum("nij,nj->ni", turn, on_flange)) @ frame.T + [500.0, 200.0, -100.0]

@@ -1,6 +1,6 @@
-"""A hexapod whose pose is read, with a noise of the orientations that is not stated: the noise and the cause are found.
+"""Robots whose pose is read, with a noise of the orientations that is not stated: the noise and the cause are found.
 
-Positions, orientations and legs are NumPy's and SciPy's alone, see `hexapod_stops`.
+Positions, orientations, legs and links are NumPy's and SciPy's alone, see `hexapod_stops` and `numpy_arm`.
 """
 
 import numpy as np
@@ -8,6 +8,7 @@ import pandas as pd
 import pytest
 from scipy.spatial.transform import Rotation
 
+import rrru
 from rrru.calibration.campaign_noise import campaign_noise
 from rrru.campaign.ingest.campaign_file import ingest
 from rrru.campaign.ingest.spec import IngestSpec
@@ -16,7 +17,7 @@ from rrru.diagnosis.settings import GapSettings
 from rrru.effects.library import NAMES
 from rrru.pipeline.setup import as_measured
 from rrru.robots.hexapod import hexapod
-from tests.diagnosis import arms, hexapod_stops
+from tests.diagnosis import arms, hexapod_stops, numpy_arm
 
 _NOISE_MM, _NOISE_RAD, _LEAD_ERROR = 0.015, 4e-5, 1.5e-3
 _HEXAPOD = hexapod(
@@ -73,6 +74,24 @@ def test_a_constant_lead_error_is_no_growth(measured):
     found = _diagnosed(measured)
     assert found.verdict["effects"] == "lead_error" and found.verdict["leg"] == 2
     assert found.verdict["noise_rms_mm"] == pytest.approx(np.sqrt(3.0) * _NOISE_MM, rel=0.2)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_an_effect_of_an_arm_is_no_noise_of_the_orientations_at_few_poses(seed):
+    """The shapes of all effects are too many columns for these poses; an encoder's disc sits off its centre."""
+    generator = np.random.default_rng(seed)
+    drive, off = numpy_arm.drives(generator)[:70], numpy_arm.errors(generator)
+    eccentric = drive.copy()
+    eccentric[:, 3] += 4e-4 * np.sin(drive[:, 3] + 0.5)
+    *_, (position, turn) = numpy_arm.links(eccentric, off)
+    table = numpy_arm.table(drive, {"tip": (position, turn, (0.0, 0.0, 0.0))}, generator).drop(columns="target")
+    seen = Rotation.from_rotvec(_NOISE_RAD * generator.standard_normal((70, 3))) * Rotation.from_matrix(turn)
+    table[[f"measured_r{axis}_rad" for axis in "xyz"]] = (numpy_arm.FRAME * seen).as_rotvec()
+    robot = rrru.load_robot("data/models/arm6.urdf")
+    campaign = rrru.read_campaign(table, robot, noise_mm=numpy_arm.NOISE_MM, frame="register", motion="stop_and_go")
+    verdict = rrru.diagnose(campaign).verdict
+    assert [effect["name"] for effect in verdict["effects"]] == ["encoder_eccentricity"]
+    assert verdict["noise_rms_mm"] == pytest.approx(np.sqrt(3.0) * numpy_arm.NOISE_MM, rel=0.15)
 
 
 @pytest.mark.parametrize("noise_rad", [None, _NOISE_RAD])

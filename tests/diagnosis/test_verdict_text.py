@@ -365,6 +365,35 @@ def test_a_noise_that_contradicts_the_stated_one_is_said_to_be_found(stated, sai
     assert said in " ".join(answered(noise_stated_mm=stated)["sentences"])
 
 
+@pytest.mark.parametrize("note", [REPEATABILITY_UNKNOWN, REPEATABILITY_UNSURE])
+@pytest.mark.parametrize("unexplained", [True, False])
+def test_random_error_may_be_a_part_of_what_is_unexplained(unexplained, note):
+    """Of a reflector that slipped once 30 to 46 % was "random error", which did not act at all."""
+    effects = "link_flexure+unexplained" if unexplained else "link_flexure"
+    (said,) = (one for one in answered(effects=effects, notes=note)["sentences"] if "random error" in one)
+    words = "is random error above the stated noise, or a part of what is unexplained. Repeatability is unknown: "
+    assert (words in said) == unexplained
+    assert ("is random error above the stated noise. Repeatability is unknown: " in said) != unexplained
+    (kind, *_) = (claim.kind for claim in claims._of_text(said, claims._SENTENCES))
+    assert kind == ("it is random error or unexplained" if unexplained else "it is random error")
+
+
+@pytest.mark.parametrize(
+    ("notes", "said"),
+    [
+        (REPEATABILITY_UNKNOWN, "After calibration these data show no systematic error (probability 0.98): "),
+        (ROBOT_REPEATS, "After calibration no cause is found (probability 0.98), but the model lacks an error: "),
+        (SUCCESSIVE_ALIKE, "After calibration no cause is found (probability 0.98), but the model lacks an error: "),
+    ],
+)
+def test_a_headline_without_causes_does_not_hide_an_error_that_passes_for_noise(notes, said):
+    """Of a mount that swayed by 0.08 mm "no systematic error" was said, and its sway was called the measuring noise."""
+    first, *_ = answered(effects="none", leg=0, notes=notes, noise_stated_mm=0.005, probability=0.98)["sentences"]
+    assert first.startswith(said)
+    assert first.endswith(" mm, the noise that was found is 0.035 mm (stated: 0.0087 mm in space).")
+    assert claims._of_text(first, claims._SENTENCES)
+
+
 @pytest.mark.parametrize(("factor", "gap", "why"), [(12.0, 0.02, "small"), (1.0, 0.0, "small"), (12.0, 0.2, "alike")])
 def test_where_shares_are_not_determined_sizes_are_said_and_why(factor, gap, why):
     budget = synthetic_gap.gap_budget(CAMPAIGN)

@@ -64,9 +64,10 @@ def ingest(spec: IngestSpec, mechanism: Robot) -> Ingested:
         sheet.problems.refuse()
     check_speed(sheet)
     mounted = target_placement(sheet) if not sheet.problems else None
-    same = check_sizes(sheet, mounted.offset_mm if mounted else 0.0)
-    # where reflectors sit is looked at in a file without problems only: without their offsets nothing is too far off
-    if same and spec.frame == "robot" and (mounted or "target" not in sheet.frame):
+    # where reflectors sit is looked at in a file without problems only: without their offsets nothing can be compared
+    placed = mounted is not None or "target" not in sheet.frame
+    same = placed and check_sizes(sheet, mounted.offset_mm if mounted else 0.0)
+    if same and spec.frame == "robot":
         check_measured(_at_tool(sheet, mounted), lambda: frame_advice(_gross_file(sheet)))
         check_turned(sheet)
     sheet.problems.refuse()

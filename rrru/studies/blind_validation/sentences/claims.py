@@ -39,11 +39,14 @@ class Claim:
     stated: dict = field(default_factory=dict)
 
 
+_NOISE = rf"noise(?: that was found)? is {_Y} mm(?: \(stated: {_NUMBER} mm in space\))?"
 # kinds of sentences of the answer
 _SENTENCES = {
     "the robot still misses by": rf"After calibration the residual error is {_X} mm at points left out of it .*",
     "nothing systematic is left": rf"After calibration these data show no systematic error \(probability {_P}\): "
-    rf"the residual error is {_X} mm, the measuring noise is {_Y} mm\.",
+    rf"the residual error is {_X} mm, the (?:measuring )?{_NOISE}\.",
+    "no cause is found but an error": rf"After calibration no cause is found \(probability {_P}\), but the model "
+    rf"lacks an error: the residual error is {_X} mm, the {_NOISE}\.",
     "no cause is named": r"No cause is named: .*\.",
     "what to check": r"Next: check units, signs and order of the drives, .*",
     "the corrected file is worse": r"The corrected file has a residual error of .*",
@@ -69,12 +72,14 @@ _SENTENCES = {
     "probability of this answer": rf"(?:Probability that it acts: (?P<each>.*)\. )?Probability of (?:exactly )?"
     rf"(?:this answer|the causes of the corrected model)(?:, alone or with further causes)?: {_P}\.",
     "it does not repeat": rf"(?:{_SHARE}|An undetermined share|Some of it) does not repeat from pass to pass.*",
+    "it is random error or unexplained": rf"(?:{_SHARE}|An undetermined share|Some of it) is random error above the "
+    r"stated noise, or a part of what is unexplained\..*",
     "it is random error": rf"(?:{_SHARE}|An undetermined share|Some of it) is random error above the stated noise.*",
     "it looks random and is correlated": rf"(?:{_SHARE}|An undetermined share|Some of it) looks like random error, "
     "but .*",
     "it looks random and repeats": rf"(?:{_SHARE}|An undetermined share|Some of it) looks like random error\..*",
     "what is left with it": rf"With {_MODEL} in the simulator the residual error at left-out points is {_X} mm; "
-    rf"the noise(?: that was found)? is {_Y} mm(?: \(stated: {_NUMBER} mm in space\))?\.",
+    rf"the {_NOISE}\.",
     "that it shrinks cannot be seen": r"That it shrinks cannot be seen at these points: .*",
     "these data cannot rule out": r"(?:These data cannot rule out|Parts of the unexplained share could be): "
     r"(?P<names>.*)\.",

@@ -403,6 +403,7 @@ _JUDGES = {
     "more acts": _more,
     "probability of this answer": _probability,
     "it does not repeat": _scatter,
+    "it is random error or unexplained": lambda stated, t, facts: t.outside or _scatter(stated, t, facts),
     "it is random error": _scatter,
     "what is left with it": lambda stated, t, _: _sized(stated["value"], t.after_mm, t, t.rows, t.after_error_mm2),
     "that it shrinks cannot be seen": lambda _, t, __: t.before_mm < t.noise_rms_mm,
@@ -417,6 +418,7 @@ _JUDGES = {
     "fitted without some points": lambda stated, t, _: int(stated["lacking"]) < int(stated["used"]) <= t.rows,
     # only errors outside every model, as those of MuJoCo's servos, make it look larger
     "the noise is larger": lambda _, t, __: t.outside or t.still_mm > _OWN * t.noise_rms_mm,
+    "no cause is found but an error": lambda _, t, __: t.outside or t.still_mm > _OWN * t.noise_rms_mm,
     "it looks random and repeats": lambda _, t, __: t.outside or t.still_mm > _OWN * t.noise_rms_mm,
     "it looks random and is correlated": lambda _, t, __: t.outside or t.still_mm > _OWN * t.noise_rms_mm,
     "successive residuals are correlated": lambda _, t, __: t.outside or t.still_mm > _OWN * t.noise_rms_mm,
