@@ -95,8 +95,9 @@ def moment_gains(
 
 def _responses(problem: DiagnosisProblem, state: ModelState) -> Iterator[tuple[str, FloatArray]]:
     """Names in JUMPS and the derivative (m, 3, c) of the readings by each jump's coefficients."""
-    at, names = problem.map_of(ModelState(state.deviations, {})), iter(JUMPS)
-    yield next(names), problem.of_rows(at.effect(WORLD))
-    yield next(names), problem.of_rows(at.drive_effect)
+    at = problem.map_of(ModelState(state.deviations, {}))
+    of_world, of_drives, of_targets = JUMPS
+    yield of_world, problem.of_rows(at.effect(WORLD))
+    yield of_drives, problem.of_rows(at.drive_effect)
     if sites := target_sites(problem.mechanism):
-        yield next(names), np.concatenate([problem.of_rows(at.effect(site))[..., :3] for site in sites], axis=-1)
+        yield of_targets, np.concatenate([problem.of_rows(at.effect(site))[..., :3] for site in sites], axis=-1)

@@ -177,24 +177,25 @@ def _looks_like(rows: Sequence[Facts]) -> list[str]:
     if not rows:
         return []
     best = rows[0]
-    size = f"{rounded(best['rms_mm'])} mm rms"
+    share = percent(best["explained"])
+    how = _function_of(best)
     if best["explained"] < OPTIONS.min_followed_share:
-        return [
-            f"The unexplained part follows no single variable that was tried: {best['follows']} comes next, a smooth "
-            f"function of it predicts {percent(best['explained'])} at left-out points."
-        ]
-    if best["follows"].startswith(JUMP):
-        predicts = f"which predicts {percent(best['explained'])} of it at left-out points ({size})"
-        return [f"The unexplained part follows {best['follows']}, {predicts}."]
-    how = "steps with" if not np.isfinite(best["scale"] or np.nan) else "a smooth function of"
+        nearest = f"{best['follows']} comes next: {how} {share} at left-out points"
+        return [f"The unexplained part follows no single variable that was tried: {nearest}."]
+    predicted = f"{how} {share} of it at left-out points ({rounded(best['rms_mm'])} mm rms)"
+    return [f"The unexplained part follows {best['follows']}: {predicted}."]
+
+
+def _function_of(best: Facts) -> str:
+    """What predicts the unexplained part, of a row of `gap_remainder`, with its verb."""
     scale, unit = best["scale"], best["unit"]
-    if unit == "rad" and how.startswith("a"):
+    if best["follows"].startswith(JUMP):
+        return "it predicts"
+    if not np.isfinite(scale or np.nan):
+        return "steps with it predict"
+    if unit == "rad":
         scale, unit = np.degrees(scale), "degrees"
-    over = f", which changes over about {rounded(scale)} {unit}," if how.startswith("a") else ""
-    return [
-        f"The unexplained part follows {best['follows']}: {how} it{over} predict{'' if how[0] == 's' else 's'} "
-        f"{percent(best['explained'])} of it at left-out points ({size})."
-    ]
+    return f"a smooth function of it, which changes over about {rounded(scale)} {unit}, predicts"
 
 
 def _small(facts: Facts, groups: Mapping[str, Facts]) -> set[str]:
@@ -404,11 +405,11 @@ def _next(facts: Facts) -> list[str]:
     if said:
         return said
     if facts["unexplained"]:
-        follows = facts["unexplained_follows"][0]["follows"] if facts["unexplained_follows"] else ""
-        if follows.startswith(JUMP):
-            moment = follows.removeprefix(JUMP).split(",")[0]
+        jumps = [row for row in facts["unexplained_follows"][:1] if row["follows"].startswith(JUMP)]
+        if jumps and jumps[0]["explained"] >= OPTIONS.min_followed_share:
+            moment = jumps[0]["follows"].removeprefix(JUMP).split(",")[0].strip()
             apart = "calibrate the readings before and after it apart"
-            return [f"Next: no run is advised, since something moved at{moment}: {apart}, or measure again."]
+            return [f"Next: no run is advised, since something moved at {moment}: {apart}, or measure again."]
         where = "the table gap_locate says where the gap is largest"
         return [f"Next: no run is advised, since no effect model fits the unexplained part; {where}."]
     decided = not (facts["groups"] or facts["confounded_with"])

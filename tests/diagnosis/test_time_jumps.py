@@ -51,5 +51,7 @@ def test_a_tracker_that_is_bumped_between_two_runs_is_no_drift_of_the_base():
     assert found.verdict["effects"] == "backlash+unexplained"
     said = " ".join(sentences(answer("bumped", found.verdict, found.tables)))
     moment = f"{0.5 * (before + after):.4g} s"
-    assert f"The unexplained part follows a jump at {moment}, as a move of the instrument or the base, which" in said
+    assert (
+        f"The unexplained part follows a jump at {moment}, as a move of the instrument or the base: it predicts" in said
+    )
     assert f"something moved at {moment}: calibrate the readings before and after it apart" in said

@@ -492,6 +492,20 @@ def test_what_the_unexplained_follows_is_said_where_one_variable_predicts_most_o
         effects="unexplained", leg=0, follows=[("the sense of motion of the drives", 0.9, np.nan, "1", 0.1)]
     )
     assert any("steps with it predict 90 % of it" in one for one in steps["sentences"])
+    jump, poor = (
+        " ".join(
+            answered(
+                effects="unexplained",
+                leg=0,
+                next_runs="",
+                follows=[("a jump at 178 s, as shifts of the targets", share, np.nan, "1", 0.1)],
+            )["sentences"]
+        )
+        for share in (0.9, 0.3)
+    )
+    assert "follows a jump at 178 s, as shifts of the targets: it predicts 90 % of it" in jump
+    assert "since something moved at 178 s: calibrate the readings before and after it apart" in jump
+    assert "as shifts of the targets comes next: it predicts 30 %" in poor and "moved at" not in poor
 
 
 def test_where_nothing_acts_or_the_library_lacks_it_no_effect_is_blamed():
