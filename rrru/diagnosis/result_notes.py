@@ -107,7 +107,7 @@ def payload_notes(inference: InferenceResult) -> Iterator[str]:
         if determined:
             size = _sized(value, interval, unit)
             if unit == "kg":
-                yield f"the platform carries {size} more than stated"
+                yield f"the platform carries {size} more than stated, if the other stated loads are right"
             else:
                 yield f"the base is tilted by {size} about {name[-1]}, the configuration assumes 0"
 

@@ -99,7 +99,7 @@ _NOTES = {
     "a zero is not determined": r"(?P<site>[^:]+): zero is not determined by the readings, .*",
     "without it a number would be off": rf"without (?P<name>\w+) (?P<parameter>\S+) would be off by {_X} .*",
     "the payload is at a bound": r"the fitted error of the (?:mass|tilt) .* is at its bound, .*",
-    "the mass is not as stated": rf"the platform carries {_X} kg{_ENDS} more than stated",
+    "the mass is not as stated": rf"the platform carries {_X} kg{_ENDS} more than stated, if .*",
     "the base is tilted": rf"the base is tilted by {_X} rad{_ENDS} about \w, the configuration assumes 0",
     "a weight is confounded": r"(?:a mass at the platform|a tilt of the base about \w) and a compliance are not .*",
     "the fit did not converge": r"the fit of .* did not converge.*",
