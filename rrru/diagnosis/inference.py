@@ -190,8 +190,9 @@ def _with_base(linear: LinearizedProblem, blocks: Mapping[EffectKey, FloatArray]
 
 
 def _least_columns(problem: DiagnosisProblem, linear: LinearizedProblem) -> tuple[FloatArray, FloatArray | None]:
-    """As `_noise_columns`, of the last step of `_fewer_blocks`, but with rough functions."""
+    """As `_noise_columns`, of the last step of `_fewer_blocks`, but with rough functions; without jumps."""
     blocks, searched = _blocks(problem, linear)
+    searched = {key: columns for key, columns in searched.items() if key[0] not in JUMPS}
     steps = list(_fewer_blocks(problem, linear, blocks))
     chosen, prior_sd = ([step for step in steps if step[1] is not None] or steps)[-1]
     columns = _with_base(linear, chosen)

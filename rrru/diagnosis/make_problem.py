@@ -69,10 +69,13 @@ def make_diagnosis_problem(
     if not used.any():
         raise FitError(f"the campaign has no point that a diagnosis can use; {_USABLE}: check the column status")
     testable, untestable = _tested(library, motion, used, _count_numbers(measurements, used, stop))
-    for name, function in unknown_functions(mechanism).items():
-        if not _lacking(function, motion, used):
-            testable[name] = function
     rows_of = {name: complete_rows(effect, motion) for name, effect in testable.items()}
+    compared = np.all([used, *rows_of.values()], axis=0)
+    for name, function in unknown_functions(mechanism).items():
+        complete = complete_rows(function, motion)
+        # no function costs the effects a reading
+        if not _lacking(function, motion, used) and complete[compared].all():
+            testable[name], rows_of[name] = function, complete
     known = {name: rows for name, rows in rows_of.items() if not rows[used].all()}
     nuisance_sd, bounds = nuisance_priors(motion, masses)
     return DiagnosisProblem(

@@ -94,7 +94,7 @@ def test_functions_of_what_does_not_vary_or_is_unknown_are_left_out():
         problem_of(frame).effects
     )
     bare = make_diagnosis_problem(frame.assign(time_s=np.nan, payload_kg=2.0), MODEL, MASSES, NOISE_MM, {})
-    assert set(bare.library) == {"unknown_drive", "unknown_affine", "unknown_place", "unknown_sense"}
+    assert set(bare.library) == {"unknown_drive", "unknown_affine", "unknown_place"}
 
 
 def test_a_tracker_that_drifts_to_and_fro_is_unexplained_and_said_to_follow_the_time():
