@@ -313,7 +313,11 @@ def _decide(
                 unnamed = tuple(name for name in unnamed if shares.get(name, 0.0) > 0.0)
                 continue
             named = tuple(term.effect for term, _ in ordered if term.effect in verdict.effects)
-            return replace(verdict, effects=named), with_effects(fitted, names), ordered
+            final = with_effects(fitted, names)
+            # without the jump an effect may have another shape or act on other legs
+            terms = {term.effect: term for term in final.hypothesis.terms}
+            ordered = tuple((terms[term.effect], share) for term, share in ordered)
+            return replace(verdict, effects=named), final, ordered
         ruled_out |= worse
         inference = inference.with_posterior(_without(inference, ruled_out, worse, prior))
 
