@@ -41,7 +41,7 @@ def test_a_few_stops_are_no_jump():
 
 @pytest.mark.parametrize(("effect", "leg"), [("backlash", 0), ("leg_asymmetry", 1)])
 def test_a_tracker_that_is_bumped_between_two_runs_is_no_drift_of_the_base(effect, leg):
-    """Without the bump in the model each leg has an asymmetry of its own: shares of terms that no fit has were asked."""
+    """Without the bump in the model each leg has an asymmetry of its own: shares of other terms were asked for."""
     frame = measure((strong(effect, 4.0, leg=leg),))
     read = ["measured_x_mm", "measured_y_mm", "measured_z_mm"]
     starts = frame.groupby("run")["time_s"].agg(["min", "max"]).sort_values("min")
