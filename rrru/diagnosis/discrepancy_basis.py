@@ -15,15 +15,12 @@ import numpy as np
 from numpy.polynomial import chebyshev
 
 from rrru.arrays import FloatArray
-from rrru.effects.backlash import play
-from rrru.effects.protocol import PATH, Contribution, Coordinates, Effect, Motion
+from rrru.effects.protocol import Contribution, Coordinates, Effect, Motion
 from rrru.kinematics.legs import TOOL, WORLD
 from rrru.kinematics.robot import Robot
 
 # a frame that turns moves what is so far from the robot's as much as its shift does
 _TURNED_ABOUT_MM = 1000.0
-# backlash of this width is the sense alone; above the rounding of drive values
-_SMALLEST_WIDTH = 1e-6
 _DRIVE_ORDERS, _TIME_ORDERS = (1, 2, 3, 4, 5, 6), (1, 2, 3)
 
 
@@ -123,13 +120,6 @@ def _of_load(motion: Motion) -> FloatArray:
     return np.asarray(load[:, None] * _of_place(motion))
 
 
-def _of_sense(motion: Motion) -> FloatArray:
-    """The sense (n, K, 1) in which each drive has arrived, -1 or 1, 0 where both are as probable."""
-    arrived = -play(np.ascontiguousarray(motion.path_drive), np.full(motion.drive.shape[1], _SMALLEST_WIDTH))
-    sense = np.clip(arrived[motion.path_index] / _SMALLEST_WIDTH, -1.0, 1.0)
-    return motion.with_approach(sense, np.ones(sense.shape[1]))[..., None]
-
-
 def _of_rate(motion: Motion) -> FloatArray:
     """Speed (n, K, 2) of each drive, of unit size, and its square with the sense."""
     rate = motion.drive_rate / np.maximum(np.nanmax(np.abs(motion.drive_rate), axis=0), 1e-9)
@@ -170,7 +160,6 @@ _SMOOTH = {
         ),
         Unknown("unknown_place", "the place", _of_place, 10, ()),
         Unknown("unknown_load", "the payload", _of_load, 10, ("payload_kg",)),
-        Unknown("unknown_sense", "the sense of motion of the drives", _of_sense, 1, (PATH,), True, 1e-4),
         Unknown("unknown_rate", "the speeds of the drives", _of_rate, 2, ("drive_rate",), True, 1e-4),
     )
 }

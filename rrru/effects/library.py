@@ -32,7 +32,7 @@ _ORDER = (
 RESERVED = (
     *("none", "unexplained", "weight", "shape", "geometry", "calibration", "sampling", "scatter", "runs", "instrument"),
     *("unknown_drive", "unknown_zeros", "unknown_drift", "unknown_targets"),
-    *("unknown_affine", "unknown_place", "unknown_load", "unknown_sense", "unknown_rate"),
+    *("unknown_affine", "unknown_place", "unknown_load", "unknown_rate"),
     *("unknown_jump", "unknown_zero_jump", "unknown_target_jump"),
 )
 # fields of a Motion that an effect may need

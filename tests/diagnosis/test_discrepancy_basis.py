@@ -109,18 +109,6 @@ def test_a_tracker_that_drifts_to_and_fro_is_unexplained_and_said_to_follow_the_
     assert best["follows"] == "the time" and best["explained"] > 0.9
 
 
-def test_the_sense_of_a_drive_is_that_of_its_last_motion(problem):
-    sense = UNKNOWN["unknown_sense"].basis(problem.motion)[..., 0]
-    path, index = problem.motion.path_drive, problem.motion.path_index
-    for k in range(3):
-        moved = np.diff(path[:, k], prepend=path[0, k])
-        last = 0.0
-        expected = np.array([last := np.sign(step) if abs(step) > 1e-5 else last for step in moved])[index]
-        clear = (np.abs(moved[index]) > 1e-5) & np.isnan(np.broadcast_to(problem.motion.approach, sense.shape))[:, k]
-        assert clear.sum() > 200
-        np.testing.assert_allclose(sense[clear, k], expected[clear], atol=1e-9)
-
-
 @dataclass(frozen=True)
 class _Drag:
     """A servo that falls back with the square of its drive's speed."""

@@ -30,7 +30,7 @@ def problem():
 
 def test_points_that_are_known_are_used_and_no_run_begins_with_a_known_approach(problem):
     starts = starts_of_runs(problem.measurements["run"].to_numpy())
-    assert problem.used.all() and set(problem.known) == {"backlash", "friction_windup", "unknown_sense"}
+    assert problem.used.all() and set(problem.known) == {"backlash", "friction_windup"}
     assert not problem.known["backlash"][starts].any() and 0.7 < problem.known["backlash"].mean() < 1.0
     np.testing.assert_array_equal(problem.known["backlash"], np.isnan(problem.motion.approach).all(axis=1))
     assert len(problem) == problem.used.sum() == len(problem.points) == len(problem.run) == problem.count
