@@ -14,7 +14,7 @@ from rrru.diagnosis.budget import budget
 from rrru.diagnosis.design.advise import Advice, advise
 from rrru.diagnosis.design.run_limits import StatedLimits
 from rrru.diagnosis.determined import few_readings, require_determined
-from rrru.diagnosis.discrepancy_basis import JUMPS, UNKNOWN
+from rrru.diagnosis.discrepancy_basis import JUMPS, lone_jump
 from rrru.diagnosis.discrepancy_bias import discrepancy_covariance
 from rrru.diagnosis.drive_functions import drive_functions
 from rrru.diagnosis.inference import (
@@ -295,9 +295,7 @@ def _decide(
             inference = inference.with_posterior(inference.posterior.all_unexplained())
         verdict = decide(inference.posterior, inference.problem.effects, small)
         names = (*verdict.effects, *(name for name in unnamed if name not in ruled_out))
-        unknown = inference.hypothesis.effects & UNKNOWN.keys()
-        # several functions together are no jump but something else
-        jump = unknown & JUMPS.keys() if verdict.unexplained and len(unknown) == 1 else ()
+        jump = lone_jump(inference.hypothesis.effects) if verdict.unexplained else ()
         fitted = with_effects(inference, (*names, *jump))
         least = OPTIONS.max_heldout_loss_nats if verdict.unexplained else -OPTIONS.max_heldout_loss_nats
         worse = {name for name, gain in _gains(fitted).items() if gain < least}

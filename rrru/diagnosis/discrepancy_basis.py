@@ -6,7 +6,7 @@ is "unexplained". What moves once, such as an instrument that is bumped, is no s
 readings jump at a moment, which `rrru.diagnosis.time_jumps` finds.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import TypeAlias
@@ -181,6 +181,12 @@ def target_sites(robot: Robot) -> tuple[str, ...]:
 def unknown_functions(robot: Robot) -> dict[str, Unknown]:
     """The smooth functions of UNKNOWN for a robot's drives and targets."""
     return {name: _of_robot(function, robot) for name, function in _SMOOTH.items() if _has_sites(function, robot)}
+
+
+def lone_jump(effects: Collection[str]) -> frozenset[str]:
+    """The jump among effects and functions, none next to another function: several together are no jump."""
+    functions = UNKNOWN.keys() & set(effects)
+    return frozenset(functions & JUMPS.keys() if len(functions) == 1 else ())
 
 
 def jump_at(name: str, robot: Robot, moment: float, log_prior: float) -> Unknown:

@@ -29,7 +29,7 @@ from rrru.diagnosis.discrepancy_basis import UNKNOWN
 from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.problem import DiagnosisProblem
 from rrru.diagnosis.state import LinearizedProblem, ModelState
-from rrru.diagnosis.terms import EffectTerm, signatures
+from rrru.diagnosis.terms import EffectTerm, known_basis, signatures
 from rrru.effects.harmonic import drives_of, waves
 from rrru.effects.protocol import Effect, Motion, Search
 
@@ -51,9 +51,7 @@ def with_spectra(
     if not open_ones:
         return problem, []
     # a rough function of the drives' values contains all harmonics: together with it none would be left
-    known = [term for term in terms if term.effect not in UNKNOWN and not library[term.effect].coordinates.broad]
-    nuisance = np.concatenate([linear.base, *signatures(library, linear, known)], axis=-1)
-    basis, _ = np.linalg.qr(nuisance.reshape(linear.data.size, -1))
+    basis = known_basis(library, linear, terms)
     data = _without(linear.data.reshape(-1, 1), basis)[:, 0]
     changed = []
     for effect in open_ones:

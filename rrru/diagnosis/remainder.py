@@ -12,6 +12,7 @@ import pandas as pd
 
 from rrru.arrays import BoolArray, FloatArray, IntArray
 from rrru.cache import cached_on
+from rrru.diagnosis.discrepancy_basis import lone_jump
 from rrru.diagnosis.heldout import within
 from rrru.diagnosis.inference import InferenceResult
 from rrru.diagnosis.options import OPTIONS
@@ -29,8 +30,9 @@ _AMPLITUDES = (0.3, 1.0, 3.0)
 def remainder_rows(inference: InferenceResult) -> pd.DataFrame:
     """Rows of `gap_remainder` without the campaign, the variable that explains most first.
 
-    A jump that the most probable hypothesis has comes before it: stops on both sides of a pause do not distinguish a
-    jump from a function of the time. Of all drives or targets and of one it is that of the highest evidence.
+    A jump that is the only function of the most probable hypothesis comes before it: stops on both sides of a pause do
+    not distinguish a jump from a function of the time. Of all drives or targets and of one it is that of the highest
+    evidence.
 
     explained: share of the mean square, noise taken off, that is predicted at left-out points, 0 to 1; scale: distance
     over which the function changes, in the unit of its variable, NaN for steps; rms_mm: of the prediction.
@@ -45,13 +47,13 @@ def remainder_rows(inference: InferenceResult) -> pd.DataFrame:
     noise = left.size * (1.0 - calibration.taken) * problem.noise_mm**2
     beyond = (left**2).sum() - noise
     hypothesis, _ = inference.posterior.best()
-    result, first = [], {}
+    jump, result, first = lone_jump(hypothesis.effects), [], {}
     for variable in _variables(inference, rows) if beyond > 0.0 else ():
         predicted, scale, evidence = _predicted(variable, left, fold, problem.noise_mm, calibration)
         explained = 1.0 - (((left - predicted) ** 2).sum() - noise) / beyond
         rms = float(np.sqrt((predicted**2).sum(axis=1).mean()))
         result.append((variable.follows, float(np.clip(explained, 0.0, 1.0)), scale, variable.unit, rms))
-        if variable.jump in hypothesis.effects:
+        if variable.jump in jump:
             first[variable.follows] = evidence
     result.sort(key=lambda row: (-first.get(row[0], -np.inf), -row[1]))
     return pd.DataFrame(result, columns=COLUMNS)

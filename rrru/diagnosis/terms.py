@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rrru.arrays import FloatArray
-from rrru.diagnosis.discrepancy_basis import Library, TestedEffect
+from rrru.diagnosis.discrepancy_basis import UNKNOWN, Library, TestedEffect
 from rrru.diagnosis.state import LinearizedProblem
 from rrru.effects.protocol import Coordinates, Motion
 from rrru.kinematics.chain import active_sites
@@ -117,6 +117,13 @@ def signatures(library: Library, linear: LinearizedProblem, terms: Sequence[Effe
         columns if term.legs == EACH else columns @ spread(library[term.effect].coordinates, term.legs)
         for columns, term in pairs
     ]
+
+
+def known_basis(library: Library, linear: LinearizedProblem, terms: Sequence[EffectTerm]) -> FloatArray:
+    """Orthonormal basis (3n, b) of the calibration and of the terms that are no functions of many coefficients."""
+    known = [term for term in terms if term.effect not in UNKNOWN and not library[term.effect].coordinates.broad]
+    columns = np.concatenate([linear.base, *signatures(library, linear, known)], axis=-1)
+    return np.linalg.qr(columns.reshape(linear.data.size, -1))[0]
 
 
 def sites(library: Library, motion: Motion, term: EffectTerm, legs: Collection[int] | None = None) -> list[str]:

@@ -13,11 +13,11 @@ import numpy as np
 
 from rrru.arrays import FloatArray
 from rrru.diagnosis.aliases import EffectKey
-from rrru.diagnosis.discrepancy_basis import JUMPS, UNKNOWN, Unknown, jump_at, target_sites
+from rrru.diagnosis.discrepancy_basis import JUMPS, Unknown, jump_at, target_sites
 from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.problem import DiagnosisProblem
 from rrru.diagnosis.state import LinearizedProblem, ModelState
-from rrru.diagnosis.terms import EffectTerm, signatures
+from rrru.diagnosis.terms import EffectTerm, known_basis
 from rrru.kinematics.legs import WORLD
 
 
@@ -32,11 +32,7 @@ def with_jumps(
     time = problem.motion.time_s[problem.at]
     if not np.isfinite(time).all():
         return problem, {}
-    known = [
-        term for term in terms if term.effect not in UNKNOWN and not problem.library[term.effect].coordinates.broad
-    ]
-    nuisance = np.concatenate([linear.base, *signatures(problem.library, linear, known)], axis=-1)
-    basis, _ = np.linalg.qr(nuisance.reshape(linear.data.size, -1))
+    basis = known_basis(problem.library, linear, terms)
     left = linear.data.ravel() - basis @ (basis.T @ linear.data.ravel())
     by_row = basis.reshape(*linear.data.shape, -1)
     library, columns = dict(problem.library), {}

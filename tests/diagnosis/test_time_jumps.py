@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from rrru.diagnosis.discrepancy_basis import lone_jump
 from rrru.diagnosis.time_jumps import moment_gains
 from rrru.diagnosis.verdict_facts import answer
 from rrru.diagnosis.verdict_text import sentences
@@ -32,6 +33,12 @@ def test_the_reduction_of_each_moment_is_that_of_least_squares_with_and_without_
             for flat in (nuisance.reshape(3 * count, -1), columns.reshape(3 * count, -1))
         )
         assert without @ without - with_it @ with_it == pytest.approx(gain, rel=1e-9)
+
+
+def test_a_jump_next_to_another_function_is_none():
+    assert lone_jump({"backlash", "unknown_jump"}) == {"unknown_jump"}
+    assert not lone_jump({"unknown_jump", "unknown_drift"}) and not lone_jump({"unknown_jump", "unknown_zero_jump"})
+    assert not lone_jump({"backlash", "unknown_drift"}) and not lone_jump(())
 
 
 def test_a_few_stops_are_no_jump():
