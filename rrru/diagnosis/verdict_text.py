@@ -408,8 +408,8 @@ def _next(facts: Facts) -> list[str]:
         jumps = [row for row in facts["unexplained_follows"][:1] if row["follows"].startswith(JUMP)]
         if jumps and jumps[0]["explained"] >= OPTIONS.min_followed_share:
             moment = jumps[0]["follows"].removeprefix(JUMP).split(",")[0].strip()
-            apart = "calibrate the readings before and after it apart"
-            return [f"Next: no run is advised, since something moved at {moment}: {apart}, or measure again."]
+            do = "calibrate the readings before and after it separately, or measure again"
+            return [f"Next: no run is advised, since something changed at {moment}: {do}."]
         where = "the table gap_locate says where the gap is largest"
         return [f"Next: no run is advised, since no effect model fits the unexplained part; {where}."]
     decided = not (facts["groups"] or facts["confounded_with"])

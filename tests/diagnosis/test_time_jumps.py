@@ -63,4 +63,4 @@ def test_a_tracker_that_is_bumped_between_two_runs_is_no_drift_of_the_base(effec
     assert (
         f"The unexplained part follows a jump at {moment}, as a move of the instrument or the base: it predicts" in said
     )
-    assert f"something moved at {moment}: calibrate the readings before and after it apart" in said
+    assert f"something changed at {moment}: calibrate the readings before and after it separately" in said

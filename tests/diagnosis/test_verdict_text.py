@@ -504,8 +504,8 @@ def test_what_the_unexplained_follows_is_said_where_one_variable_predicts_most_o
         for share in (0.9, 0.3)
     )
     assert "follows a jump at 178 s, as shifts of the targets: it predicts 90 % of it" in jump
-    assert "since something moved at 178 s: calibrate the readings before and after it apart" in jump
-    assert "as shifts of the targets comes next: it predicts 30 %" in poor and "moved at" not in poor
+    assert "since something changed at 178 s: calibrate the readings before and after it separately" in jump
+    assert "as shifts of the targets comes next: it predicts 30 %" in poor and "changed at" not in poor
 
 
 def test_where_nothing_acts_or_the_library_lacks_it_no_effect_is_blamed():
