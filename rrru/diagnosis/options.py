@@ -272,10 +272,21 @@ class DiagnosisOptions:
     max_advised_runs: int = 3
     # poses at another speed or payload are worth it where they gain this many times as much; assumed
     min_gain_ratio_of_harder_poses: float = 1.1
-    # trajectories and pairs of answers that runs are designed for, and poses of a run; assumed, bound the time
+    # trajectories that runs are designed for, answers that they should tell apart, and poses of a run; assumed, bound
+    # the time
     max_advised_trajectories: int = 4
-    max_advised_rivals: int = 3
-    max_advised_poses: int = 10
+    max_rival_answers: int = 5
+    max_advised_poses: int = 40
+    # answers of less probability are no rivals that a run is designed for; assumed
+    min_rival_answer_probability: float = 0.02
+    # axes of the covariance of an effect's coefficients along which data are made; assumed, bounds the time
+    max_spread_axes: int = 6
+    # poses are advised where no run resolves so much of the doubt; assumed
+    decisive_share: float = 0.9
+    # beyond a few poses no more are chosen than resolve so much, each at least this share of the rest; assumed
+    enough_share: float = 0.95
+    few_poses: int = 10
+    min_share_of_rest: float = 0.05
     # less expected log Bayes factor than this is not worth a run: it is "not worth more than a bare mention" (Kass and
     # Raftery, Bayes factors, Journal of the American Statistical Association 90, 1995)
     min_run_gain_nats: float = 1.0
@@ -286,8 +297,8 @@ class DiagnosisOptions:
     pass_length_mm: float = 100.0
     # a drive that turns further between two points of a pass goes round, or past a singularity; assumed
     max_pass_step_rad: float = 0.5
-    # log2 of the number of passes that are tried: 256; assumed
-    tried_passes_log2: int = 8
+    # log2 of the number of passes that are tried: 128; assumed, bounds the time
+    tried_passes_log2: int = 7
     # a pass has at least this share of the campaign's own distance from singularities; assumed
     min_singularity_distance_ratio: float = 0.8
 

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from rrru.diagnosis.aliases import Facts
-from rrru.diagnosis.design.expected_information import apart
+from rrru.diagnosis.design.rival_answers import apart
 from rrru.diagnosis.result_tables import acting_places
 from rrru.diagnosis.verdict import NOT_TESTED
 from rrru.diagnosis.verdict_text import sentences

@@ -8,7 +8,7 @@ from collections.abc import Collection, Mapping, Sequence
 import numpy as np
 
 from rrru.diagnosis.aliases import Facts
-from rrru.diagnosis.design.expected_information import apart
+from rrru.diagnosis.design.rival_answers import apart
 from rrru.diagnosis.design.run_limits import NO_PAYLOAD, WITHIN_LIMITS
 from rrru.diagnosis.number_text import (
     capitalized,

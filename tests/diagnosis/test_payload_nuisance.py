@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 import yaml
 
-from rrru.diagnosis.design.expected_information import present_and_planned
+from rrru.diagnosis.design.expected_information import contests
+from rrru.diagnosis.design.rival_answers import RivalAnswer
 from rrru.diagnosis.diagnose import MeasuredRobot, diagnose
 from rrru.diagnosis.payload_nuisance import nuisance_priors
 from rrru.diagnosis.settings import GapSettings, check
@@ -58,9 +59,14 @@ def as_stated():
 def test_the_campaign_driven_once_more_is_worth_as_much_again(misled):
     *_, inference = misled
     nothing = replace(inference.hypothesis, terms=(), prior_scales=np.zeros((len(DISCREPANCY_SCALES), 0)))
-    answers = (inference.hypothesis, inference.level), (nothing, inference.level)
-    now, runs = present_and_planned(inference, *answers, inference.problem)
-    assert (sum(runs[1:], now + runs[0])).misfit_nats() == pytest.approx(2.0 * now.misfit_nats(), rel=1e-3)
+    answers = [
+        RivalAnswer(words, (hypothesis, inference.level), 0.5)
+        for words, hypothesis in (("named", inference.hypothesis), ("none", nothing))
+    ]
+    # all of its points as one run
+    once = replace(inference.problem, measurements=inference.problem.measurements.assign(run=1))
+    about = contests(inference, answers, once)
+    np.testing.assert_allclose(about.gains()[0], np.concatenate([one.now_nats for one in about.predictions]), rtol=1e-3)
 
 
 def test_with_payload_and_tilt_the_order_of_the_terms_makes_no_difference(misled):

@@ -1,15 +1,15 @@
-"""Which further run would decide between two answers: computed by what each candidate adds, not by rule of thumb.
+"""Which further run would decide between answers: computed by what each candidate adds, not by rule of thumb.
 
-Candidates are further passes along a campaign's own trajectories. Where none of them would decide between the first two
-answers, poses are chosen too, each the one that adds most to those before it. What they add is counted as
-`rrru.diagnosis.design.expected_information` says. Where a trajectory was driven again before, and that was expected to
-decide, the readings show which share f of the expected gain was realized. What needs no other payload or speed is then
-worth f times as much. No candidate exceeds the limits of the robot, see
+Candidates are further passes along a campaign's own trajectories. Where none of them would resolve most of the doubt
+between all probable answers, poses are chosen too, each the one that adds most to those before it. What they add is
+counted as `rrru.diagnosis.design.expected_information` says. Where a trajectory was driven again before, and that was
+expected to decide, the readings show which share f of the expected gain was realized. What needs no other payload or
+speed is then worth f times as much. No candidate exceeds the limits of the robot, see
 `rrru.diagnosis.design.run_limits`.
 """
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
@@ -19,13 +19,8 @@ from rrru.arrays import FloatArray
 from rrru.campaign import measurements as rows
 from rrru.diagnosis.aliases import Row
 from rrru.diagnosis.design import poses
-from rrru.diagnosis.design.expected_information import (
-    AnswerPair,
-    answer_pairs,
-    choose_greedily,
-    present_and_planned,
-    realized_log_bayes_factors,
-)
+from rrru.diagnosis.design.expected_information import Contests, contests, realized_log_bayes_factors
+from rrru.diagnosis.design.rival_answers import RivalAnswer, rival_answers
 from rrru.diagnosis.design.run_limits import RunLimits, StatedLimits, run_limits
 from rrru.diagnosis.inference import InferenceResult
 from rrru.diagnosis.make_problem import make_diagnosis_problem
@@ -64,95 +59,111 @@ class Advice:
 NOTHING = Advice(pd.DataFrame(columns=_COLUMNS), pd.DataFrame(columns=_POSE))
 
 
-def advise(
-    inference: InferenceResult,
-    verdict: Verdict,
-    masses: Masses,
-    stated: StatedLimits | None = None,
-    sizes: Mapping[str, float] | None = None,
-) -> Advice:
+def advise(inference: InferenceResult, verdict: Verdict, masses: Masses, stated: StatedLimits | None = None) -> Advice:
     """The Advice, empty where no rival answer is left that the library can predict.
 
-    stated: StatedLimits of the robot, by default none; sizes: by effect the rms in mm of its part of the gap. Runs that
-    decide what matters most come first.
+    stated: StatedLimits of the robot, by default none. Runs that resolve most of the doubt come first.
     """
-    pairs = answer_pairs(inference, verdict, sizes or {})
-    if not pairs:
+    answers = rival_answers(inference.posterior, verdict)
+    if not answers:
         return NOTHING
     stated = stated or StatedLimits()
     limits, limited = run_limits(inference.problem, masses, stated)
-    result = _runs(inference, pairs, masses, limits)
-    seen = [_realized(inference, pair, result, number) for number, pair in enumerate(pairs)]
-    result = [_as_realized(row, seen[row["pair"]]) for row in result]
-    first, listed = [row for row in result if row["pair"] == 0], NOTHING.poses
-    if not any(row["gain_nats"] > OPTIONS.decisive_gain_nats for row in first):
-        row, listed = _poses(inference, pairs[0], masses, limits)
-        row = [_as_realized(one, seen[0]) for one in row]
-        result, first = result + row, first + row
-    runs = pd.DataFrame(result, columns=["pair", *_COLUMNS])
-    runs = runs[runs["gain_nats"] > OPTIONS.min_run_gain_nats]
-    # decisive runs first, those of the most important pair before others; then the most informative ones
-    turn = runs["pair"].where(runs["gain_nats"] > OPTIONS.decisive_gain_nats, len(pairs))
-    runs = runs.assign(turn=turn).sort_values(
-        ["turn", "gain_nats", "run"], ascending=[True, False, True], kind="stable"
+    found, listed, share = _runs(inference, answers, masses, limits), NOTHING.poses, 1.0
+    if found:
+        share = realized_share(inference, found)
+        found = [one.as_realized(share) for one in found]
+    if not any(one.resolves > OPTIONS.decisive_share for one in found):
+        poses_found, listed = _poses(inference, answers, masses, limits)
+        found += [one.as_realized(share) for one in poses_found]
+    rows = [one.row() for one in found]
+    # of runs that are equally informative the simplest one, as they are listed
+    order = sorted(range(len(rows)), key=lambda k: -round(found[k].resolves, 2))
+    worth = [k for k in order if rows[k]["gain_nats"] > OPTIONS.min_run_gain_nats][: OPTIONS.max_advised_runs]
+    runs = pd.DataFrame([rows[k] for k in worth], columns=_COLUMNS)
+    open_still = verdict.sure < OPTIONS.min_sure_probability and not any(
+        one.gain_of_first > OPTIONS.min_run_gain_nats for one in found
     )
-    runs = runs.drop_duplicates("run").head(OPTIONS.max_advised_runs)[[*_COLUMNS]].reset_index(drop=True)
-    some_gain = any(row["gain_nats"] > OPTIONS.min_run_gain_nats for row in first)
-    open_still = not some_gain and verdict.sure < OPTIONS.min_sure_probability
     listed = listed if (runs["kind"] == "poses").any() else NOTHING.poses
-    undecided = pairs[0].separates if open_still else ""
+    undecided = " / ".join(one.words for one in answers[:2]) if open_still else ""
     return Advice(runs, listed, undecided, limited or (stated.words if open_still else ""))
 
 
-def _runs(inference: InferenceResult, pairs: Sequence[AnswerPair], masses: Masses, limits: RunLimits) -> list[Row]:
-    """Rows of `gap_next_runs` of all candidate runs, with the number of the AnswerPair that each is counted for."""
+@dataclass(frozen=True)
+class Candidate:
+    """A run as a mapping of the columns RUN, the Contests it is counted for, and its gains (s,) in nats.
+
+    plain: gains (s,) of the same trajectory driven once more, without another payload or speed.
+    """
+
+    run: Row
+    contests: Contests
+    gains: FloatArray
+    plain: FloatArray
+
+    @property
+    def resolves(self) -> float:
+        """The share of the doubt that it resolves."""
+        return float(self.contests.resolved(self.gains).sum())
+
+    @property
+    def gain_of_first(self) -> float:
+        """Gain in nats for the two most probable answers."""
+        return float(self.contests.by_pair(self.gains)[self.contests.first])
+
+    def as_realized(self, share: float) -> "Candidate":
+        """With the gain that needs no other payload or speed multiplied by the share that was realized before."""
+        return replace(self, gains=self.gains - (1.0 - share) * np.clip(self.plain, 0.0, self.gains))
+
+    def row(self) -> Row:
+        """Row of `gap_next_runs` without campaign and rank, for the pair of answers of which it resolves most."""
+        pair = int(self.contests.resolved(self.gains).argmax())
+        now, gain = float(self.contests.now_nats[pair]), float(self.contests.by_pair(self.gains)[pair])
+        return self.run | {"separates": self.contests.separates(pair), "now_nats": now, "gain_nats": gain}
+
+
+def _runs(
+    inference: InferenceResult, answers: Sequence[RivalAnswer], masses: Masses, limits: RunLimits
+) -> list[Candidate]:
+    """All candidate runs."""
     choice, table = candidates(inference.problem.measurements, limits)
-    if not choice:
+    planned = _planned(inference.problem, table, masses) if choice else None
+    if planned is None or not _have_inputs(planned, answers):
         return []
-    planned, result = _planned(inference.problem, table, masses), []
-    for number, pair in enumerate(pairs):
-        if not _have_inputs(planned, pair):
-            continue
-        now, added = present_and_planned(inference, pair.truth, pair.rival, planned)
-        start = now.misfit_nats()
-        for run, one in zip(choice, added, strict=True):
-            about = {"pair": number, "separates": pair.separates, "now_nats": start}
-            result.append(run | about | {"gain_nats": (now + one).misfit_nats() - start})
-    return result
+    about = contests(inference, answers, planned)
+    gains = about.gains()
+    again = {run["trajectory"]: gain for run, gain in zip(choice, gains, strict=True) if _is_again(run)}
+    most = np.max([*again.values()], axis=0, initial=0.0) if again else np.zeros(gains.shape[1])
+    return [
+        Candidate(run, about, gain, again.get(run["trajectory"], most)) for run, gain in zip(choice, gains, strict=True)
+    ]
 
 
-def _realized(
-    inference: InferenceResult, pair: AnswerPair, rows: Sequence[Row], number: int
-) -> tuple[float, dict[str, float]]:
+def _is_again(run: Row) -> bool:
+    """Whether a run repeats one that was driven, alike."""
+    return bool(run["run"] == f"{run['trajectory']} {_AGAIN}")
+
+
+def realized_share(inference: InferenceResult, found: Sequence[Candidate]) -> float:
     """Share of the expected gain that the last run along a trajectory driven before has added, at most 1.
 
-    1 where it was not expected to decide. And the expected gain of a plain repetition by trajectory; number: of the
-    AnswerPair among rows of `_runs`.
+    1 where it was not expected to decide.
     """
-    again = [row for row in rows if row["pair"] == number and row["run"] == f"{row['trajectory']} {_AGAIN}"]
-    expected = {row["trajectory"]: row["gain_nats"] for row in again}
+    about = found[0].contests
+    again = {one.run["trajectory"]: one for one in found if _is_again(one.run)}
     frame = inference.problem.measurements[inference.problem.used]
     driven = frame.groupby("run", sort=False)["trajectory"].first().astype(str)
-    repeated = driven[driven.duplicated() & driven.isin(expected)]
+    repeated = driven[driven.duplicated() & driven.isin(again)]
     if repeated.empty:
-        return 1.0, expected
-    run, trajectory = repeated.index[-1], repeated.iloc[-1]
-    count = next(row["points"] for row in again if row["trajectory"] == trajectory)
-    whole = expected[trajectory] * float((frame["run"] == run).sum()) / count
-    if not whole > OPTIONS.decisive_gain_nats:
-        return 1.0, expected
+        return 1.0
+    run, last = repeated.index[-1], again[repeated.iloc[-1]]
+    expected = last.gain_of_first * float((frame["run"] == run).sum()) / last.run["points"]
+    if not expected > OPTIONS.decisive_gain_nats:
+        return 1.0
     # evidence for either answer counts
-    found = abs(realized_log_bayes_factors(inference, pair.truth, pair.rival).get(run, np.inf))
-    return float(min(found / whole, 1.0)), expected
-
-
-def _as_realized(row: Row, seen: tuple[float, Mapping[str, float]]) -> Row:
-    """A row of `gap_next_runs` whose gain without another payload or speed is multiplied by `_realized`'s share."""
-    share, expected = seen
-    plain = expected.get(row["trajectory"], max(expected.values(), default=0.0))
-    if row["run"].endswith(" poses"):
-        plain = row["gain_nats"]
-    return row | {"gain_nats": row["gain_nats"] - (1.0 - share) * min(row["gain_nats"], max(plain, 0.0))}
+    answers = [one.answer for one in about.pairs[about.first]]
+    realized = abs(realized_log_bayes_factors(inference, answers).get(run, np.inf))
+    return float(min(realized / expected, 1.0))
 
 
 def _planned(problem: DiagnosisProblem, table: pd.DataFrame, masses: Masses) -> DiagnosisProblem:
@@ -167,21 +178,20 @@ def _planned(problem: DiagnosisProblem, table: pd.DataFrame, masses: Masses) -> 
     )
 
 
-def _have_inputs(planned: DiagnosisProblem, pair: AnswerPair) -> bool:
-    """Whether planned runs have what the effects of an AnswerPair need, such as times or temperatures."""
-    answers = pair.truth, pair.rival
-    return all(term.effect in planned.library for hypothesis, _ in answers for term in hypothesis.terms)
+def _have_inputs(planned: DiagnosisProblem, answers: Sequence[RivalAnswer]) -> bool:
+    """Whether planned runs have what the effects of all answers need, such as times or temperatures."""
+    return all(term.effect in planned.library for one in answers for term in one.answer[0].terms)
 
 
 def _poses(
-    inference: InferenceResult, pair: AnswerPair, masses: Masses, limits: RunLimits
-) -> tuple[list[Row], pd.DataFrame]:
-    """The row of poses of `gap_next_runs` in a list, which is empty where there are none, and `gap_next_poses`.
+    inference: InferenceResult, answers: Sequence[RivalAnswer], masses: Masses, limits: RunLimits
+) -> tuple[list[Candidate], pd.DataFrame]:
+    """Poses as a candidate in a list, which is empty where there are none, and `gap_next_poses`.
 
     They are driven as the campaign was, or faster, or with a higher payload, whichever is most informative.
     """
     problem = inference.problem
-    best: tuple[list[Row], pd.DataFrame] = [], NOTHING.poses
+    best: tuple[list[Candidate], pd.DataFrame] = [], NOTHING.poses
     passes = poses.passes(problem.measurements, problem.mechanism)
     if not len(passes):
         return best
@@ -190,7 +200,9 @@ def _poses(
     # a payload that was carried: the median may lie between two
     own_load = float(np.quantile(payload, 0.5, method="higher"))
     last_s, most = _end_s(problem.measurements), 0.0
-    for fast, loaded in _harder(problem, pair):
+    # no more readings than there are
+    most_poses = min(OPTIONS.max_advised_poses, max(problem.count // OPTIONS.points_per_pass, 1))
+    for fast, loaded in _harder(problem, answers):
         speed = limits.fast(stated_speed, np.full(1, np.nan)) if fast else own_speed
         load = limits.loaded_kg(float(payload.max())) if loaded else own_load
         if (fast and not (speed > stated_speed and np.isfinite(last_s))) or (loaded and not load > own_load):
@@ -201,30 +213,37 @@ def _poses(
             continue
         table = some.commands(problem.mechanism, last_s + OPTIONS.pause_between_runs_s, speed, load)
         planned = _planned(problem, table, masses)
-        if not _have_inputs(planned, pair):
+        if not _have_inputs(planned, answers):
             continue
-        now, added = present_and_planned(inference, pair.truth, pair.rival, planned)
-        chosen, _ = choose_greedily(now, added, OPTIONS.max_advised_poses)
-        chosen = chosen[: some.within(chosen, speed, limits.seconds)]
+        about = contests(inference, answers, planned)
+        chosen, gains = about.choose(most_poses)
+        within = some.within(chosen, speed, limits.seconds)
+        if within < len(chosen):
+            chosen, gains = about.choose(within)
         if not chosen:
             continue
-        gain = sum((added[number] for number in chosen), now).misfit_nats() - now.misfit_nats()
+        resolved = float(about.resolved(gains).sum())
         # a higher payload or speed has to be clearly more informative
-        if gain > OPTIONS.min_gain_ratio_of_harder_poses * most:
-            count, most = len(chosen), gain
-            words = " ".join([f"{count} poses", *_how(fast, loaded, speed, load)]), "poses", "poses", False
-            row = *words, speed, load, count * OPTIONS.points_per_pass, pair.separates, now.misfit_nats(), gain
+        if resolved > OPTIONS.min_gain_ratio_of_harder_poses * most:
+            count, most = len(chosen), resolved
+            words = (
+                " ".join([f"{count} {'poses' if count > 1 else 'pose'}", *_how(fast, loaded, speed, load)]),
+                "poses",
+                "poses",
+                False,
+            )
+            run = dict(zip(RUN, (*words, speed, load, count * OPTIONS.points_per_pass), strict=True))
             listed = some.listed(chosen).assign(speed_mm_s=speed, payload_kg=load)
-            best = [{"pair": 0, **dict(zip(_COLUMNS, row, strict=True))}], listed
+            best = [Candidate(run, about, gains, gains)], listed
     return best
 
 
-def _harder(problem: DiagnosisProblem, pair: AnswerPair) -> Iterator[tuple[bool, bool]]:
-    """Whether passes are faster, and whether they have a higher payload, as far as an effect of an AnswerPair differs.
+def _harder(problem: DiagnosisProblem, answers: Sequence[RivalAnswer]) -> Iterator[tuple[bool, bool]]:
+    """Whether passes are faster, and whether they have a higher payload, as far as an effect of an answer differs.
 
     Passes at which every effect is the same as at others decide no more than these.
     """
-    terms = [term for hypothesis, _ in (pair.truth, pair.rival) for term in hypothesis.terms]
+    terms = [term for one in answers for term in one.answer[0].terms]
     needs = {need for term in terms for need in problem.library[term.effect].needs}
     by_speed, by_load = needs - _ALIKE_AT_ANY_SPEED, needs & {*LOADS, "payload_kg"}
     return product((False, True) if by_speed else (False,), (False, True) if by_load else (False,))

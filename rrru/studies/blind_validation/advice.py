@@ -1,4 +1,4 @@
-"""Whether an advised run settles an ambiguous verdict, compared with a random run: driven, added and diagnosed.
+"""Whether an advised run settles an ambiguous verdict, compared with random runs: driven, added and diagnosed.
 
 A verdict is settled where it is right, and sure of each single decision: of each cause, or group of causes, that it
 names, and of each that it does not. The probability of all of them together would never be high: few points never tell
@@ -119,13 +119,16 @@ def follow(robot, measurements, conditions, known, library):
         generator = stream(conditions.seed, "withheld", "advice", robot.name, str(number))
         advised = arms["advised"].advised
         points = advised["points"] if advised else points
-        chosen = {"advised": advised, "random": random_run(arms["random"], points, generator)}
+        chosen = {"advised": [advised] if advised else [], "random": random_runs(arms["random"], points, generator)}
         row = before_columns | {"round": number, "gain_nats": advised["gain_nats"] if advised else np.nan}
-        for name, run in chosen.items():
-            if run:
-                longer, runs = drive(robot, arms[name], run, conditions, generator)
-                arms[name] = Arm(longer, runs, diagnose(longer, known, library, details=False))
-            row |= {f"{name}_run": run["run"] if run else "", **_verdict_columns(name, arms[name].found, robot)}
+        for name, some in chosen.items():
+            if some:
+                driven = arms[name]
+                for run in some:
+                    driven = drive(robot, driven, run, conditions, generator)
+                arms[name] = replace(driven, found=diagnose(driven.measurements, known, library, details=False))
+            words = ", ".join(run["run"] for run in some)
+            row |= {f"{name}_run": words, **_verdict_columns(name, arms[name].found, robot)}
             row[f"settled_{name}"] = row[f"right_{name}"] and arms[name].is_sure
         result.append(row)
     return result
@@ -140,21 +143,19 @@ def _verdict_columns(when, found, robot):
     }
 
 
-def random_run(arm, points, generator):
-    """A random candidate run of the advice with the nearest number of points; points 0: any run.
+def random_runs(arm, points, generator):
+    """Random candidate runs of the advice that have together at least so many points, and one at least.
 
     None where the verdict of the Arm is settled.
     """
-    if arm.is_sure:
-        return None
-    choice, _ = candidates(arm.measurements)
-    off = [abs(run["points"] - points) if points else 0 for run in choice]
-    nearest = [run for run, far in zip(choice, off, strict=True) if far == min(off)]
-    return nearest[generator.integers(len(nearest))]
+    chosen, choice = [], [] if arm.is_sure else candidates(arm.measurements)[0]
+    while choice and sum(run["points"] for run in chosen) < max(points, 1):
+        chosen.append(choice[generator.integers(len(choice))])
+    return chosen
 
 
 def drive(robot, arm, run, conditions, generator):
-    """Measurements of an Arm with an added run from a row of `gap_next_runs`, and all runs added so far."""
+    """The Arm with an added run from a row of `gap_next_runs`, with the diagnosis of before."""
     campaign = robot.campaign(conditions)
     done, poses = (*campaign.plan.runs, *arm.runs), arm.found.tables["gap_next_poses"]
     new = advised_runs(run, poses, robot.trajectories, conditions.motion)
@@ -163,7 +164,7 @@ def drive(robot, arm, run, conditions, generator):
     extra = table[table["run"] > len(done)].reset_index(drop=True)
     numbered = extra.assign(run=extra["run"] - len(done))
     noisy = with_noise(numbered, NoiseModel(**robot.noise), conditions.noise_mm, generator).assign(run=extra["run"])
-    return pd.concat([arm.measurements, noisy], ignore_index=True), (*arm.runs, *new)
+    return Arm(pd.concat([arm.measurements, noisy], ignore_index=True), (*arm.runs, *new), arm.found)
 
 
 def advice_summary(followed):

@@ -194,7 +194,7 @@ robots                 int    how many
 Ambiguous robots whose cause is hidden: the verdict has rivals, and a decision of it is below 0.9, be it that a cause or
 one of a group acts or that another does not. The same robot drives the first advised run with fresh noise; the run is
 added and diagnosed. This repeats until each decision has 0.9 or nothing is advised. For comparison the same is done
-with a random run along trajectories of the nearest number of points.
+with random runs along trajectories of at least as many points.
 --
 robot truth
 round                  int    times that runs were added, from 1 on
@@ -210,7 +210,7 @@ verdict_advised        str    verdict with all advised runs so far
 probability_advised    float  as probability_before
 right_advised          bool   as right_before
 settled_advised        bool   the verdict then is right, and each of its decisions has 0.9 or more
-random_run             str    the random run in words; empty where the verdict is settled
+random_run             str    the random runs in words; empty where the verdict is settled
 verdict_random         str    verdict with all random runs so far
 probability_random     float  as probability_before
 right_random           bool   as right_before

@@ -1,7 +1,7 @@
 """Expected information against least squares and brute force, and poses more informative than any trajectory."""
 
 from dataclasses import dataclass
-from itertools import combinations, pairwise
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -11,16 +11,17 @@ from rrru.campaign.ingest.spec import IngestSpec
 from rrru.diagnosis.calibrate import calibrate
 from rrru.diagnosis.design import poses
 from rrru.diagnosis.design.advise import advise
-from rrru.diagnosis.design.expected_information import NormalEquations, choose_greedily, without_unreachable
+from rrru.diagnosis.design.expected_information import Contests, Prediction, without_unreachable
 from rrru.diagnosis.design.run_limits import StatedLimits
 from rrru.diagnosis.inference import InferenceResult
 from rrru.diagnosis.make_problem import make_diagnosis_problem
 from rrru.diagnosis.model_fit import fit_model
 from rrru.diagnosis.model_space import explore
 from rrru.diagnosis.options import OPTIONS
+from rrru.diagnosis.posterior import Posterior
 from rrru.diagnosis.settings import Prior
 from rrru.diagnosis.state import ModelState
-from rrru.diagnosis.verdict import Verdict, decide
+from rrru.diagnosis.verdict import decide
 from rrru.effects.library import find
 from rrru.effects.protocol import Coordinates
 from rrru.errors import FitError
@@ -33,46 +34,77 @@ from tests.diagnosis.campaigns import EFFECTS, LINES, MASSES, MODEL, measure, pl
 _NOISE_MM = 0.02
 
 
-def _candidates(seed, count=8, numbers=4):
-    """Designs (5, 3, k) and data (5, 3) of made-up candidates."""
+def _candidates(seed, count=8, numbers=4, readings=15):
+    """Designs (n, k) and sets of data (n, 2) of made-up candidates, over the noise."""
     generator = np.random.default_rng(seed)
     return [
-        (generator.standard_normal((5, 3, numbers)), 0.03 * generator.standard_normal((5, 3))) for _ in range(count)
+        (generator.standard_normal((readings, numbers)), 1.5 * generator.standard_normal((readings, 2)))
+        for _ in range(count)
     ]
 
 
-def _left(parts):
-    """Half the least squares that the designs of some candidates together leave of their data, in nats."""
-    design = np.concatenate([one.reshape(-1, one.shape[-1]) for one, _ in parts]) / _NOISE_MM
-    data = np.concatenate([one.ravel() for _, one in parts]) / _NOISE_MM
-    return 0.5 * ((data - design @ np.linalg.lstsq(design, data, rcond=None)[0]) ** 2).sum()
+def _left(parts, precision):
+    """Half the least sums of squares (2,) that the designs of some candidates together leave, in nats."""
+    design = np.concatenate([*(one for one, _ in parts), np.diag(np.sqrt(precision))])
+    data = np.concatenate([*(one for _, one in parts), np.zeros((len(precision), 2))])
+    return 0.5 * ((data - design @ np.linalg.lstsq(design, data, rcond=None)[0]) ** 2).sum(axis=0)
 
 
-@pytest.mark.parametrize("seed", range(5))
-def test_each_pose_is_the_best_one_after_those_before_it(seed):
-    first, *others = _candidates(seed)
-    chosen, gain = choose_greedily(
-        NormalEquations.of(*first, _NOISE_MM), [NormalEquations.of(*one, _NOISE_MM) for one in others], 3
-    )
-    taken = [first]
+def _contests(first, others, precision):
+    """One pair of answers, about two sets of data."""
+    prediction = Prediction.of(first, others, precision)
+    return Contests(((None, None),), np.ones(1), (prediction,), np.zeros(2, dtype=int))
+
+
+@pytest.mark.parametrize(("readings", "numbers"), [(15, 4), (3, 6)])
+@pytest.mark.parametrize("seed", range(3))
+def test_each_pose_is_the_best_one_after_those_before_it(seed, readings, numbers):
+    """With more readings than coefficients, and with fewer, against least squares of all points together."""
+    first, *others = _candidates(seed, 8, numbers, readings)
+    precision = np.array([0.0, *np.full(numbers - 1, 0.5)])
+    about, start = _contests(first, others, precision), _left([first], precision)
+    np.testing.assert_allclose(about.predictions[0].now_nats, start, rtol=1e-8)
+    chosen, total = about.choose(3)
+    taken = []
     for number in chosen:
-        gains = [-np.inf if any(one is t for t in taken) else _left([*taken, one]) for one in others]
-        assert number == np.argmax(gains)
-        taken.append(others[number])
-    assert gain == pytest.approx(_left(taken) - _left([first]), rel=1e-6)
-    best = max(_left([first, *three]) for three in combinations(others, 3)) - _left([first])
-    assert 0.8 * best < gain <= best * (1.0 + 1e-9)
+        shares = [
+            -1.0
+            if k in taken
+            else np.mean(1.0 - np.exp(start - _left([first, *(others[t] for t in taken), one], precision)))
+            for k, one in enumerate(others)
+        ]
+        assert number == np.argmax(shares)
+        taken.append(number)
+    gain = _left([first, *(others[k] for k in taken)], precision) - start
+    np.testing.assert_allclose(total, gain, rtol=1e-6)
+    assert about.resolved(total)[0] == pytest.approx(np.mean(1.0 - np.exp(-gain)))
+    assert len(chosen) == 3
 
 
-def test_further_points_never_take_information_away():
-    first, *others = _candidates(9, 200)
-    now = NormalEquations.of(*first, _NOISE_MM)
-    assert min((now + NormalEquations.of(*one, _NOISE_MM)).misfit_nats() for one in others) >= now.misfit_nats()
-    # data that the design itself can fit have no information
-    made = others[0][0], others[0][0] @ np.ones(4)
-    assert (NormalEquations.of(*made, _NOISE_MM) + NormalEquations.of(*made, _NOISE_MM)).misfit_nats() == pytest.approx(
-        0.0, abs=1e-6
-    )
+def test_no_more_poses_are_chosen_than_resolve_something():
+    """Beyond a few, candidates that tell nothing are left out, and so are all where enough is known."""
+    first, *others = _candidates(1, 15)
+    silent = [(np.zeros((15, 4)), np.zeros((15, 2)))] * 12
+    # each resolves a little, as candidates that tell nothing of the coefficients do
+    weak = [(np.zeros((15, 4)), 0.08 * data) for _, data in others]
+    chosen, _ = _contests(first, [*silent, *weak], np.ones(4)).choose(26)
+    assert len(chosen) > OPTIONS.few_poses and min(chosen) >= len(silent)
+    few, _ = _contests(first, [*others[:1], *weak[:2], *silent], np.ones(4)).choose(15)
+    assert set(few) >= {0, 1, 2} and len(few) == OPTIONS.few_poses
+    strong, _ = _contests(first, others, np.ones(4)).choose(14)
+    assert len(strong) == OPTIONS.few_poses
+
+
+def test_candidates_of_different_length_are_counted_each_by_its_own_readings():
+    first, one, other = _candidates(3, 3)
+    short = one[0][:6], one[1][:6]
+    found = _contests(first, [short, other], np.ones(4)).gains()
+    alone = [_contests(first, [some], np.ones(4)).gains()[0] for some in (short, other)]
+    np.testing.assert_allclose(found, alone, rtol=1e-9)
+    # further points never take information away; data that the design itself can fit have none
+    assert (found > 0.0).all()
+    made = one[0], one[0] @ np.ones((4, 2))
+    np.testing.assert_allclose(Prediction.of(made, [made], np.zeros(4)).gains(), 0.0, atol=1e-6)
 
 
 def test_passes_lie_between_measured_points_within_reach():
@@ -203,12 +235,14 @@ def test_poses_are_advised_for_an_arm_with_the_orientation_to_command():
     calibrated = calibrate(problem)
     evidence = problem.evidence(problem.linearise(calibrated))
     posterior = explore(evidence, Prior())
+    # both are as probable
+    alone = [posterior.best_of(frozenset([name])) for name in library]
+    weights = np.array([np.where(np.arange(len(one.evidence)) == level, 0.0, -50.0) for one, level in alone])
+    even = Posterior(tuple(one for one, _ in alone), weights, np.zeros(weights.shape, dtype=bool))
     found = InferenceResult(
-        problem, calibrated, calibrated, fit_model(problem, [calibrated]), evidence, posterior, *posterior.best()
+        problem, calibrated, calibrated, fit_model(problem, [calibrated]), evidence, even, *even.best()
     )
-    rivals = ((frozenset(["compliance_outside"]), False, 0.4),)
-    verdict = Verdict(("drive_compliance",), False, 0.5, 0, ("compliance_outside",), rivals)
-    advice = advise(found, verdict, arms.MASSES)
+    advice = advise(found, decide(even, library), arms.MASSES)
     best, listed = advice.runs.iloc[0], advice.poses
     assert best["kind"] == "poses" and best["gain_nats"] > OPTIONS.decisive_gain_nats and advice.undecided == ""
     turned = listed[[f"command_r{axis}_rad" for axis in "xyz"]]

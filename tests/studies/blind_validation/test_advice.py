@@ -55,7 +55,8 @@ def test_every_candidate_is_driven_as_it_was_planned(robot):
     arm = _arm(measurements)
     choice, table = candidates(measurements)
     for number, run in enumerate(choice, start=1):
-        longer, runs = advice.drive(robot, arm, run, CONDITIONS, np.random.default_rng(0))
+        driven = advice.drive(robot, arm, run, CONDITIONS, np.random.default_rng(0))
+        longer, runs = driven.measurements, driven.runs
         pd.testing.assert_frame_equal(longer.iloc[: len(measurements)], measurements)
         extra, planned = longer.iloc[len(measurements) :], table[table["run"] == number]
         assert len(runs) == 1 and (extra["run"] == measurements["run"].max() + 1).all()
@@ -70,13 +71,14 @@ def test_the_robot_that_drives_on_is_the_one_that_was_measured(robot):
     free = noise_free(robot, CONDITIONS)
     silent = replace(CONDITIONS, noise_mm=0.0)
     again = next(run for run in candidates(free)[0] if run["run"] == "line_1 once more")
-    longer, runs = advice.drive(robot, _arm(free), again, silent, np.random.default_rng(0))
-    twice, both = advice.drive(robot, replace(_arm(longer), runs=runs), again, silent, np.random.default_rng(0))
+    once = advice.drive(robot, _arm(free), again, silent, np.random.default_rng(0))
+    both = advice.drive(robot, once, again, silent, np.random.default_rng(0))
+    twice = both.measurements
     first = rows.measured(free[free["trajectory"] == "line_1"])
     for number in (1, 2):
         last = twice[twice["run"] == free["run"].max() + number]
         np.testing.assert_allclose(rows.measured(last), first, atol=1e-9)
-    assert len(both) == 2 and twice["time_s"].is_monotonic_increasing
+    assert len(both.runs) == 2 and twice["time_s"].is_monotonic_increasing
 
 
 def test_poses_are_driven_one_by_one(robot):
@@ -85,7 +87,8 @@ def test_poses_are_driven_one_by_one(robot):
     start, end = found.start_mm[:3], found.end_mm[:3]
     listed = {**rows.vector_columns("from", start), **rows.vector_columns("to", end)}
     run = {"kind": "poses", "trajectory": "poses", "reverse": False, "speed_mm_s": 80.0, "payload_kg": 5.0}
-    longer, runs = advice.drive(robot, _arm(measurements, poses=listed), run, CONDITIONS, np.random.default_rng(0))
+    driven = advice.drive(robot, _arm(measurements, poses=listed), run, CONDITIONS, np.random.default_rng(0))
+    longer, runs = driven.measurements, driven.runs
     extra = longer.iloc[len(measurements) :]
     assert len(runs) == 3 and extra.groupby("run").size().tolist() == [OPTIONS.points_per_pass] * 3
     np.testing.assert_allclose(rows.command(extra), points_of(start, end).reshape(-1, 3), atol=1e-9)
@@ -94,14 +97,17 @@ def test_poses_are_driven_one_by_one(robot):
     assert names == {run["trajectory"] for run in candidates(measurements)[0]}
 
 
-def test_a_random_run_is_as_long_as_the_advised_one(robot):
+def test_random_runs_have_as_many_points_as_the_advised_one(robot):
     measurements = robot.measured(CONDITIONS)
     arm, generator = _arm(measurements), np.random.default_rng(0)
-    assert {advice.random_run(arm, 40, generator)["trajectory"] for _ in range(9)} == {"spiral"}
-    lines = {advice.random_run(arm, 26, generator)["run"] for _ in range(60)}
-    assert len(lines) > 5 and "spiral" not in " ".join(lines)
-    assert {advice.random_run(arm, 50, generator)["points"] for _ in range(9)} == {40}
-    assert advice.random_run(_arm(measurements, 0.95), 26, generator) is None
+    for points in (0, 26, 40, 100):
+        chosen = [advice.random_runs(arm, points, generator) for _ in range(20)]
+        count = [sum(run["points"] for run in some) for some in chosen]
+        # the last one is needed
+        before = [sum(run["points"] for run in some[:-1]) for some in chosen]
+        assert min(count) >= max(points, 1) and max(before) < max(points, 1)
+    assert len({run["run"] for some in chosen for run in some}) > 5
+    assert advice.random_runs(_arm(measurements, 0.95), 26, generator) == []
 
 
 def test_what_is_unsure_beside_rivals_is_ambiguous():
