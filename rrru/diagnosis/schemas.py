@@ -222,24 +222,25 @@ high_95                float  upper end of the 95 % interval
 worst                  bool   true where the error of this drive is largest
 
 ## gap_next_runs | tables/gap_next_runs.parquet | campaign rank
-Runs that would separate effects which are confounded in this campaign, best first.
+Runs that would separate effects which are confounded in this campaign. Those that resolve most of the doubt between all
+probable answers are first.
 --
 campaign
-rank                   int    1: most informative
+rank                   int    1: resolves most
 run                    str    the run in words
 kind                   str    run: once more along a trajectory; poses: those of gap_next_poses, where no such run would
-    rule a rival out {run, poses}
+    decide {run, poses}
 trajectory             str    trajectory to drive, or poses
 reverse                bool   true where it is driven backwards
 speed_mm_s             float? speed; null where any will do
 payload_kg             float? payload; null where any will do
 points                 int    points of the run
-separates              str    the effects, joined by ' / '
+separates              str    the two answers between which it decides best, joined by ' / '
 now_nats               float  expected log evidence between them in the present campaign
 gain_nats              float  expected log evidence that the run adds
 
 ## gap_next_poses | tables/gap_next_poses.parquet | campaign pose
-Poses that would separate effects where no further run along a trajectory of the campaign would rule a rival out. Each
+Poses that would separate effects where no further run along a trajectory of the campaign would decide. Each
 is the middle of a straight pass from rest to rest, five points of which are read, both ends included. They lie in the
 box about the measured points, within the drives' ranges and clear of singularities; whether anything else is in the way
 there has not been checked.
