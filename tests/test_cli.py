@@ -173,9 +173,8 @@ def test_a_gross_mistake_in_a_file_gets_one_message(number, tmp_path, capsys):
     name, own, handed = with_mistake(number, SEED, STOPS)
     if not shows(name, own, handed):
         pytest.skip("it does not show in this file")
-    replace(own, nominal=handed.nominal).write(tmp_path, handed.rows, "stops.csv")
-    robot = handed.nominal.section(str(tmp_path / own.robot_file), own.kind)
-    section = handed.section | {"ingest": str(tmp_path / "stops.csv")}
+    section, robot = replace(own, nominal=handed.nominal).write(tmp_path, handed.rows)
+    section = handed.section | {"ingest": section["ingest"]}
     (tmp_path / "mine.yaml").write_text(yaml.safe_dump({"robots": {"own": robot}, "campaigns": {"stops": section}}))
     arguments = ("stops", "--config", tmp_path / "mine.yaml")
     code, out, message = ran(capsys, "diagnose", *arguments, "--out", tmp_path / "results")

@@ -5,6 +5,7 @@ import numpy as np
 from rrru.campaign.plan import make_plan
 from rrru.campaign.trajectories import Line, Spiral
 from rrru.effects.library import active_effects, library
+from rrru.robots.from_dh import from_dh
 from rrru.robots.ptt3 import Ptt3
 from rrru.robots.rrru3 import Rrru3
 from rrru.simulation.virtual_robot import VirtualRobot
@@ -14,6 +15,9 @@ ROBOT = Rrru3()
 ELSEWHERE = ("drive_error_function", "transmission_orders", "read_before_rest", "thermal_expansion")
 EFFECTS = {name: effect for name, effect in library(ROBOT).items() if name not in ELSEWHERE}
 SLIDER_EFFECTS = {name: effect for name, effect in library(Ptt3()).items() if name not in ELSEWHERE}
+TURN_AND_SLIDE = from_dh(
+    [{"d_mm": 300, "a_mm": 200, "range_deg": [-90, 90]}, {"sliding": True, "range_mm": [0, 200]}], name="arm"
+)
 LINE = Line("line", (-450.0, -100.0, 600.0), (350.0, 150.0, 700.0), 60)
 SPIRAL = Spiral("spiral", (0.0, 0.0), (50.0, 300.0), (560.0, 760.0), 4.0, 60)
 FORWARD = {"reverse": False, "payload_kg": 0.0}

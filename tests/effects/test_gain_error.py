@@ -9,19 +9,15 @@ from rrru.diagnosis.diagnose import MeasuredRobot, diagnose
 from rrru.diagnosis.settings import GapSettings
 from rrru.effects.library import find
 from rrru.robots.delta import Delta
-from rrru.robots.from_dh import from_dh
 from rrru.robots.rrru3 import Rrru3
 from tests.diagnosis import arms
 from tests.diagnosis.gantry import GANTRY
+from tests.effects.robots import TURN_AND_SLIDE
 
 
 def test_arms_that_turn_have_it_and_slides_and_parallel_robots_do_not():
     assert all(find("gain_error", robot) is None for robot in (GANTRY, Rrru3(), Delta()))
-    mixed = from_dh(
-        [{"d_mm": 300, "a_mm": 200, "range_deg": [-90, 90]}, {"sliding": True, "range_mm": [0, 200]}], name="arm"
-    )
-    assert find("gain_error", mixed).parameters.names == ("gain_error1",)
-    assert find("lead_error", mixed).parameters.names == ("lead_error2",)
+    assert find("gain_error", TURN_AND_SLIDE).parameters.names == ("gain_error1",)
 
 
 def test_a_joint_turns_a_constant_share_too_far():

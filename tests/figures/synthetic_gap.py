@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 
 from rrru.studies.blind_validation.verdicts import PLANTS
-from tests.schemas import TABLES, check
+from tests.schemas import TABLES, check, filled
 
 EFFECTS = (
     *(
@@ -31,21 +31,7 @@ _SHARES = {"share_closed": 0.96, "share_closed_low": 0.94, "share_closed_high": 
 
 def gap_verdicts(campaign, effects="link_flexure+backlash", **changes):
     """`gap_verdicts` of one campaign."""
-    texts = {
-        "confounded_with": "drive_compliance",
-        "groups": "",
-        "next_runs": NEXT,
-        "undecided": "",
-        "noise_from": "repeats",
-    }
-    texts |= {
-        "unnamed": "",
-        "notes": "",
-        "not_in_model": "",
-        "no_answer": "",
-        "file_remainder": "",
-        "file_headline": "",
-    }
+    texts = {"confounded_with": "drive_compliance", "next_runs": NEXT, "noise_from": "repeats"}
     texts["where"] = "leg 2 wrist, leg 1 drive to leg 3 drive"
     numbers = {"probability": 0.97, "leg": 2, "noise_rms_mm": NOISE_MM, "gap_rms_mm": 0.37, "gap_after_rms_mm": 0.02}
     numbers |= {"file_error_mm": np.nan, "file_error_fresh_mm": np.nan}
@@ -58,9 +44,7 @@ def gap_verdicts(campaign, effects="link_flexure+backlash", **changes):
         "points": 144,
         "dropped_points": 2,
     }
-    return check(
-        "gap_verdicts", pd.DataFrame([{"campaign": campaign, "effects": effects} | texts | numbers | _SHARES | changes])
-    )
+    return filled("gap_verdicts", [{"campaign": campaign, "effects": effects} | texts | numbers | _SHARES | changes])
 
 
 def gap_budget(campaign):
@@ -93,10 +77,7 @@ def gap_attribute(
         decision = "named" if probability >= 0.7 else "possible"
         rows[name] |= {"probability": probability, "legs": legs, "decision": decision}
     frame = pd.DataFrame.from_dict(rows, orient="index").rename_axis("effect").reset_index()
-    return check(
-        "gap_attribute",
-        frame.assign(campaign=campaign, heldout_gain=12.0, heldout_gain_low=9.0, heldout_gain_high=15.0),
-    )
+    return filled("gap_attribute", frame.assign(campaign=campaign))
 
 
 def gap_shrink(campaign, trajectories, steps=2, kinds=("held_out", "resimulated")):
@@ -138,17 +119,12 @@ def gap_points(ground):
     used[[4, len(ground) // 2]] = False
     before[~used] += 3.0
     after = np.where(used[:, None], noise * 1.1, np.nan)
-    frame = ground.assign(
-        used=used,
-        **{f"drive_error{k}_rad": 1e-4 * k for k in (1, 2, 3)},
-        **{f"drive_error{k}_mm": np.nan for k in (1, 2, 3)},
-    )
     vectors = {
         f"{name}_{axis}_mm": part[:, k]
         for name, part in (("before", before), ("after", after))
         for k, axis in enumerate("xyz")
     }
-    return check("gap_points", frame.assign(**vectors))
+    return filled("gap_points", ground.assign(used=used, **vectors))
 
 
 def gap_tables(campaign, ground):

@@ -38,6 +38,12 @@ def _turned(poses):
     return Rotation.from_matrix(poses.turn).as_rotvec()
 
 
+def _lumps(robot, joint):
+    """Masses (n,) in kg and places (n, 3) in mm of the point masses behind a joint."""
+    own = [point_mass for point_mass in robot.point_masses if point_mass.joint == joint]
+    return np.array([one.mass_kg for one in own]), np.array([one.at_mm for one in own])
+
+
 def _foreign(model, qpos, body, base=0):
     """MuJoCo's own position in mm and turn of a body in the frame of a base, at joint positions qpos."""
     data = mujoco.MjData(model)
@@ -98,9 +104,7 @@ def test_an_arm_may_be_read_from_its_tip_to_its_root():
         np.testing.assert_allclose(poses.position_mm[k], position, atol=1e-9)
         np.testing.assert_allclose(poses.turn[k], turn, atol=1e-12)
     # the root stands still in the file, but moves in this frame
-    assert sum(
-        point_mass.mass_kg for point_mass in robot.point_masses if point_mass.joint == "platform"
-    ) == pytest.approx(14.0)
+    assert _lumps(robot, "platform")[0].sum() == pytest.approx(14.0)
 
 
 def test_an_inverse_of_an_arm_is_undone_by_mujoco():
@@ -214,9 +218,7 @@ def test_bars_are_found_behind_any_joints_that_make_them(six, tmp_path):
     assert all(leg.bar for leg in robot.legs.legs)
     np.testing.assert_allclose(robot.forward(changes), six.forward(changes), atol=1e-9)
     # the tops are parts of the plate
-    assert sum(
-        point_mass.mass_kg for point_mass in robot.point_masses if point_mass.joint == "platform"
-    ) == pytest.approx(4.9)
+    assert _lumps(robot, "platform")[0].sum() == pytest.approx(4.9)
 
 
 def test_mujoco_s_simulation_of_the_hexapod_comes_to_rest_on_the_closed_form(six):
@@ -363,8 +365,8 @@ def test_sites_hold_together_too(tmp_path):
     poses = robot.solve(np.array([[0.3]]), robot.legs.home_mm[None])
     np.testing.assert_allclose(_turned(poses)[0, 1], _four_bar_angle(0.3), atol=1e-12)
     # the body "hand" is a part of the platform, wherever it is placed in the file
-    hand = [point_mass for point_mass in robot.point_masses if point_mass.joint == "platform"][6:]
-    np.testing.assert_allclose(np.mean([point_mass.at_mm for point_mass in hand], axis=0), [0.0, 100.0, 0.0], atol=1e-9)
+    _, points = _lumps(robot, "platform")
+    np.testing.assert_allclose(points[6:].mean(axis=0), [0.0, 100.0, 0.0], atol=1e-9)
 
 
 def test_a_home_pose_of_rounded_numbers_is_closed(tmp_path):
@@ -397,11 +399,7 @@ def _inertia(points, mass):
 def test_lumps_have_mass_centre_and_inertia_of_their_bodies():
     robot, model = from_urdf(ARM), _urdf_model(ARM)
     for joint, body in (("axis1", "shoulder"), ("axis2", "upper_arm"), ("axis3", "elbow"), ("axis5", "wrist")):
-        point_masses = [point_mass for point_mass in robot.point_masses if point_mass.joint == joint]
-        mass, points = (
-            np.array([point_mass.mass_kg for point_mass in point_masses]),
-            np.array([point_mass.at_mm for point_mass in point_masses]),
-        )
+        mass, points = _lumps(robot, joint)
         own = model.body(body)
         assert mass.sum() == pytest.approx(own.mass[0], rel=1e-12)
         np.testing.assert_allclose(mass @ points / mass.sum(), 1000.0 * own.ipos, atol=1e-9)
@@ -409,27 +407,19 @@ def test_lumps_have_mass_centre_and_inertia_of_their_bodies():
         expected = 1e6 * turn @ np.diag(own.inertia) @ turn.T
         np.testing.assert_allclose(_inertia(points - 1000.0 * own.ipos, mass), expected, atol=1e-6)
     # the flange behind the tool's frame, the base not at all
-    platform = [point_mass for point_mass in robot.point_masses if point_mass.joint == "platform"]
-    np.testing.assert_allclose(
-        np.mean([point_mass.at_mm for point_mass in platform], axis=0), [0.0, 0.0, -10.0], atol=1e-9
-    )
+    np.testing.assert_allclose(_lumps(robot, "platform")[1].mean(axis=0), [0.0, 0.0, -10.0], atol=1e-9)
     assert sum(point_mass.mass_kg for point_mass in robot.point_masses) == pytest.approx(31.2)
 
 
 def test_lumps_of_a_bar_lie_along_it(six):
-    model, cylinder = (
-        mujoco.MjModel.from_xml_path(str(HEXAPOD)),
-        [x for x in six.point_masses if x.joint == "leg 2 bar"],
-    )
-    centre = np.mean([point_mass.at_mm[0] for point_mass in cylinder])
-    assert sum(point_mass.mass_kg for point_mass in cylinder) == pytest.approx(1.4) and centre == pytest.approx(125.0)
-    across = sum(point_mass.mass_kg * (point_mass.at_mm[0] - centre) ** 2 for point_mass in cylinder)
-    assert across == pytest.approx(1e6 * model.body("cylinder2").inertia.max())
-    piston = [point_mass for point_mass in six.point_masses if point_mass.joint == "leg 2 end"]
+    model = mujoco.MjModel.from_xml_path(str(HEXAPOD))
+    mass, cylinder = _lumps(six, "leg 2 bar")
+    centre = cylinder[:, 0].mean()
+    assert mass.sum() == pytest.approx(1.4) and centre == pytest.approx(125.0)
+    assert mass @ (cylinder[:, 0] - centre) ** 2 == pytest.approx(1e6 * model.body("cylinder2").inertia.max())
     # its middle is 100 mm before its body, which is 200 mm up the leg
-    assert np.mean([point_mass.at_mm[0] for point_mass in piston]) == pytest.approx(
-        300.0 - six.legs.legs[1].bar.length_mm
-    )
+    _, piston = _lumps(six, "leg 2 end")
+    assert piston[:, 0].mean() == pytest.approx(300.0 - six.legs.legs[1].bar.length_mm)
 
 
 def _mass_centre(robot, actuators, poses):
@@ -480,9 +470,9 @@ def test_what_hangs_on_a_leg_is_carried_by_it(tmp_path):
         actuators=servos(*CRANKED_JOINTS),
     )
     robot = from_mjcf(path, "tip")
-    own = [point_mass for point_mass in robot.point_masses if point_mass.joint == "platform"]
-    assert sum(point_mass.mass_kg for point_mass in own) == pytest.approx(0.6) and len(robot.parts.drives) == 6
-    np.testing.assert_allclose(np.mean([point_mass.at_mm for point_mass in own[6:]], axis=0), 0.0, atol=1e-9)
+    mass, points = _lumps(robot, "platform")
+    assert mass.sum() == pytest.approx(0.6) and len(robot.parts.drives) == 6
+    np.testing.assert_allclose(points[6:].mean(axis=0), 0.0, atol=1e-9)
 
 
 def test_meshes_that_are_not_there_and_links_without_mass_do_no_harm(tmp_path):

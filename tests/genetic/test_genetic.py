@@ -1,6 +1,5 @@
 """The whole algorithm: against a loop that replays it, and for what it promises."""
 
-import importlib.util
 import random
 from dataclasses import replace
 
@@ -14,11 +13,7 @@ from rrru.genetic.algorithm import BLOCK, minimise
 from rrru.genetic.operators import has_stalled
 from rrru.genetic.settings import OPERATORS, GeneticSettings
 from rrru.robots.rrru3 import Rrru3
-from tests.places import ROOT
-
-_SPEC = importlib.util.spec_from_file_location("matlab_ga", ROOT / "tests" / "reference" / "matlab_ga.py")
-matlab_ga = importlib.util.module_from_spec(_SPEC)
-_SPEC.loader.exec_module(matlab_ga)
+from tests.reference import matlab_ga
 
 # paper A, Table 5
 TABLE_5_RAD = {"dtheta1": 0.0012, "dtheta2": -0.0003, "dtheta3": 0.0003}

@@ -1,17 +1,12 @@
 """The operators against exact loops, and the properties their sources promise."""
 
-import importlib.util
 import itertools
 
 import numpy as np
 import pytest
 
 from rrru.genetic import operators, plan
-from tests.places import ROOT
-
-_SPEC = importlib.util.spec_from_file_location("matlab_ga", ROOT / "tests" / "reference" / "matlab_ga.py")
-matlab_ga = importlib.util.module_from_spec(_SPEC)
-_SPEC.loader.exec_module(matlab_ga)
+from tests.reference import matlab_ga
 
 ULP = np.finfo(float).eps / 2.0
 SCORES = {

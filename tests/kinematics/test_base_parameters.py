@@ -21,12 +21,8 @@ def test_all_errors_of_an_own_robot_of_unknown_frame_are_calibrated(number, tmp_
 
     What is left of readings with hardly any noise is about a micrometre.
     """
-    own = draw(number, 771, 300, 0.0)
-    own = replace(own, noise_mm=NOISE_MM)
-    rows = own.table(own.readings(own.poses(cause=False)), True)
-    own.write(tmp_path, rows[np.repeat(~own.stops.fresh, len(own.targets))], "stops.csv")
-    given = own.section(tmp_path, "stops.csv")
-    described = own.nominal.section("", own.kind)
+    own = replace(draw(number, 771, 300, 0.0), noise_mm=NOISE_MM, cause=None)
+    given, described = own.write(tmp_path, own.file_rows)
     robot = rrru.load_robot(
         tmp_path / own.robot_file, **{key: value for key, value in described.items() if key not in ("urdf", "mjcf")}
     )

@@ -73,10 +73,16 @@ calibration: {{sets: {{lines: ["line_*"]}}}}
 _TABLES = ("parameters", "error_summary", "gap_verdicts")
 
 
-def _run(folder, reads="", **parts):
-    """Verdict, error summary, parameters and measurements of the whole way with an own robot."""
-    parts["reads"] = reads
-    (folder / "mine.yaml").write_text(_OVERLAY.format(**parts))
+def _run(folder, robot, made, wrong, width, errors="zero", reads=""):
+    """Verdict, error summary, parameters and measurements of the whole way with an own robot.
+
+    made: the robot, driven along x about its home; wrong: name and size of its error; width: of every drive's backlash.
+    """
+    (x, y, z), (error, size) = made.legs.home_mm.round(1).tolist(), wrong
+    parts = {"robot": robot, "error": error, "size": size, "errors": errors, "reads": reads}
+    parts |= {"start": [x - 60.0, y, z], "end": [x + 60.0, y, z]}
+    play = json.dumps({f"width{k}": width for k in range(1, len(made.parts.drives) + 1)})
+    (folder / "mine.yaml").write_text(_OVERLAY.format(**parts, play=play))
     targets = [f"results/campaigns/own/{name}.parquet" for name in _TABLES]
     code, output = run_here(folder, *targets, "results/figures/own/cross.png", overlays=("mine.yaml",))
     assert code == 0, output
@@ -84,20 +90,13 @@ def _run(folder, reads="", **parts):
     return {name: pd.read_parquet(folder / f"results/campaigns/own/{name}.parquet") for name in names}
 
 
-def test_a_robot_of_a_users_module_goes_the_whole_way(tmp_path):
+def test_a_robot_of_a_users_module_goes_the_whole_way(tmp_path, monkeypatch):
     """A fourth robot in a module of less than 60 lines, no file of the package touched: its play is named."""
     assert len(_MODULE.splitlines()) < 60
     (tmp_path / "planar.py").write_text(_MODULE)
-    result = _run(
-        tmp_path,
-        robot='{module: "planar:make"}',
-        error="dmotor2",
-        size=0.002,
-        play="{width1: 0.001, width2: 0.001, width3: 0.001}",
-        start=[-60.0, 0.0, 0.0],
-        end=[60.0, 0.0, 0.0],
-        errors="full",
-    )
+    monkeypatch.syspath_prepend(tmp_path)
+    planar = make_mechanism("planar", {"module": "planar:make"}, parameter_set="zero")
+    result = _run(tmp_path, '{module: "planar:make"}', planar, ("dmotor2", 0.002), 0.001, errors="full")
     verdict = result["gap_verdicts"].iloc[0]
     assert verdict["effects"] == "backlash" and verdict["share_closed"] > 0.8
     assert verdict["where"] == "leg 1 motor to leg 3 motor"
@@ -119,20 +118,9 @@ def test_an_arm_from_a_urdf_file_goes_the_whole_way(tmp_path):
     The tracker sees two reflectors at every point and the orientation.
     """
     arm = make_mechanism("arm", {"urdf": str(ROOT / "data/models/arm6.urdf")}, parameter_set="zero")
-    x, y, z = (float(value) for value in arm.legs.home_mm.round(1))
-    column = arm.parts.columns[1]
-    error = f"d{column.rpartition('_')[0]}"
-    result = _run(
-        tmp_path,
-        robot="{urdf: data/models/arm6.urdf}",
-        error=error,
-        size=0.002,
-        play="{" + ", ".join(f"width{k}: 0.0005" for k in range(1, 7)) + "}",
-        start=[x - 60.0, y, z],
-        end=[x + 60.0, y, z],
-        errors="zero",
-        reads=" noise_rad: 1.0e-4, targets: {ball: [20.0, 0.0, 60.0], nest: [-30.0, 10.0, 50.0]},",
-    )
+    error = f"d{arm.parts.columns[1].rpartition('_')[0]}"
+    reads = " noise_rad: 1.0e-4, targets: {ball: [20.0, 0.0, 60.0], nest: [-30.0, 10.0, 50.0]},"
+    result = _run(tmp_path, "{urdf: data/models/arm6.urdf}", arm, (error, 0.002), 0.0005, reads=reads)
     measured = result["measurements"]
     assert len(measured) == 2 * 2 * 3 * 15 and set(measured["target"]) == {"ball", "nest"}
     # where the robot was sent, an orientation is read with its noise alone and the little that the errors turn it by
@@ -155,18 +143,7 @@ def test_an_arm_of_dh_rows_with_a_joint_that_follows_goes_the_whole_way(tmp_path
     """Ten drives and a chest that two of them keep upright, described in the configuration alone."""
     section = humanoid.section()
     arm = make_mechanism("arm", section, parameter_set="zero")
-    x, y, z = (float(value) for value in arm.legs.home_mm.round(1))
-    result = _run(
-        tmp_path,
-        robot=json.dumps(section),
-        error="dtorso1",
-        size=0.002,
-        play="{" + ", ".join(f"width{k}: 0.0005" for k in range(1, 11)) + "}",
-        start=[x - 60.0, y, z],
-        end=[x + 60.0, y, z],
-        errors="zero",
-        reads=" noise_rad: 1.0e-4,",
-    )
+    result = _run(tmp_path, json.dumps(section), arm, ("dtorso1", 0.002), 0.0005, reads=" noise_rad: 1.0e-4,")
     measured = result["measurements"]
     assert set(arm.parts.columns) <= set(measured) and "chest_rad" not in measured
     places = arm.forward(measured[arm.parts.columns].to_numpy(dtype=float))
@@ -198,17 +175,9 @@ def test_parameters_that_are_not_identifiable_are_left_out_and_named():
 def test_the_example_hexapod_of_an_mjcf_file_goes_the_whole_way(tmp_path):
     """Its six legs' play is named at the legs, in its own columns."""
     hexapod = make_mechanism("h", {"mjcf": str(ROOT / "data/models/hexapod.xml"), "platform": "plate"})
-    x, y, z = (float(value) for value in hexapod.legs.home_mm.round(1))
-    result = _run(
-        tmp_path,
-        robot="{mjcf: data/models/hexapod.xml, platform: plate}",
-        error=f"d{hexapod.parts.columns[2].rpartition('_')[0]}",
-        size=0.4,
-        play="{" + ", ".join(f"width{k}: 0.1" for k in range(1, 7)) + "}",
-        start=[x - 60.0, y, z],
-        end=[x + 60.0, y, z],
-        errors="zero",
-    )
+    error = f"d{hexapod.parts.columns[2].rpartition('_')[0]}"
+    robot = "{mjcf: data/models/hexapod.xml, platform: plate}"
+    result = _run(tmp_path, robot, hexapod, (error, 0.4), 0.1)
     assert set(hexapod.parts.columns) <= set(result["measurements"])
     verdict = result["gap_verdicts"].iloc[0]
     legs = drive_words(hexapod).all_names

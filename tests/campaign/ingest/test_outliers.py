@@ -243,11 +243,9 @@ def test_errors_of_the_geometry_near_a_singularity_are_no_outliers(seed):
 def test_orientations_near_a_singularity_are_no_outliers(wrong, tmp_path):
     """One stop of a right file of a hexapod was one; an orientation that is off by three degrees is one."""
     own = draw(74, 4002, 300, 0.0)
-    table = own.table(own.readings(own.poses()), True)[~own.stops.fresh]
+    table = own.file_rows
     table.loc[[*wrong], "measured_rx_rad"] += np.radians(3.0)
-    own.write(tmp_path, table, "stops.csv")
-    section = own.section(tmp_path, "stops.csv")
-    found = page.read(section, own.nominal.section(str(tmp_path / own.robot_file), own.kind)).measurements
+    found = page.read(*own.write(tmp_path, table)).measurements
     assert np.flatnonzero(found["status"] == "outlier").tolist() == [*wrong]
 
 

@@ -14,6 +14,15 @@ _MOTION = {"speed_mm_s": 80.0, "acceleration_mm_s2": 40.0, "dwell_s": 60.0}
 CONDITIONS = Conditions(_MECHANISM, _MOTION, Masses(), 0.02, 2021)
 
 
+_COUNTED = ("robots", "per_effect", "per_noise", "many", "background", "as_robots_are", "mujoco", "own")
+
+
+def section(**stated):
+    """The section `withheld` with what is stated: nothing else is counted or listed."""
+    lists = {"effects": [], "field": [], "files": [], "as_robots_are_files": [], "chunk": 4}
+    return dict.fromkeys(_COUNTED, 0) | lists | stated
+
+
 def bare(number, kind="paper", name="bare"):
     """A robot that deviates from the nominal one, and nothing more."""
     return replace(draw.bare(name, np.random.default_rng(number), CONDITIONS), kind=kind)

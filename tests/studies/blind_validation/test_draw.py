@@ -23,11 +23,10 @@ from rrru.studies.blind_validation.noise import NOISES, NoiseModel
 from rrru.studies.blind_validation.robots import noise_free, robot_of, true_gap_mm
 from rrru.studies.blind_validation.score import limits, with_truth
 from rrru.studies.blind_validation.verdicts import PLANTS
-from tests.studies.blind_validation.conditions import CONDITIONS, acting, bare
+from tests.studies.blind_validation.conditions import CONDITIONS, acting, bare, section
 
 _MECHANISM = CONDITIONS.mechanism
 _CONFIG = {"campaigns": {"paper": {}}, "robots": {"rrru3": {"L1_mm": 400.0}, "mine": {"mjcf": "mine.xml"}}}
-_NOT_AS_THEY_ARE = {"as_robots_are": 0, "as_robots_are_files": []}
 
 
 def _calibrated(measurements):
@@ -236,9 +235,7 @@ def _count(number):
 
 
 def test_chunks_hold_every_robot_once():
-    section = {"robots": 7, "per_effect": 3, "effects": list(EFFECTS), "chunk": 4}
-    others = {"per_noise": 0, "many": 0, "background": 0, "mujoco": 0, "own": 0, "files": []} | _NOT_AS_THEY_ARE
-    parts = list(chunks(section | others).values())
+    parts = list(chunks(section(robots=7, per_effect=3, effects=list(EFFECTS))).values())
     count = 7 + 3 * len(EFFECTS)
     assert [len(part) for part in parts] == [4] * (count // 4) + [count % 4] * (count % 4 > 0)
     names = [member.name for part in parts for member in part]
@@ -247,21 +244,12 @@ def test_chunks_hold_every_robot_once():
 
 
 def test_chunks_hold_the_robots_of_every_check():
-    section = {"robots": 1, "per_effect": 1, "effects": ["backlash"], "per_noise": 2, "many": 3, "background": 2}
-    section |= {"mujoco": 4, "own": 3, "files": ["a_file", "b_file"]}
-    section |= {"as_robots_are": 7, "as_robots_are_files": ["b_file", "c_file"]}
-    members = [member for chunk in chunks(section | {"chunk": 100}).values() for member in chunk]
+    alike = {"many": 3, "background": 2, "as_robots_are": 7, "mujoco": 4, "own": 3}
+    lists = {"effects": ["backlash"], "files": ["a_file", "b_file"], "as_robots_are_files": ["b_file", "c_file"]}
+    wanted = section(robots=1, per_effect=1, per_noise=2, chunk=100, **alike, **lists)
+    members = [member for chunk in chunks(wanted).values() for member in chunk]
     counted = Counter(member.check for member in members)
-    assert counted == {
-        "label": 1,
-        "effect": 1,
-        "noise": 2 * len(NOISES),
-        "many": 3,
-        "background": 2,
-        "as_robots_are": 7,
-        "mujoco": 4,
-        "own": 3,
-    }
+    assert counted == {"label": 1, "effect": 1, "noise": 2 * len(NOISES)} | alike
     assert len({member.name for member in members}) == len(members)
     for member in members:
         assert noise_of(member.name) == (member.about if member.check == "noise" else "")
@@ -276,17 +264,16 @@ def test_chunks_hold_the_robots_of_every_check():
 
 
 def test_robots_of_a_chunk_have_the_same_drives():
-    section = {"robots": 3, "per_effect": 0, "effects": [], "per_noise": 0, "many": 0, "background": 0, "chunk": 2}
-    parts = chunks(section | {"mujoco": 4, "own": 3, "files": ["a_file", "b_file"]} | _NOT_AS_THEY_ARE)
+    parts = chunks(section(robots=3, mujoco=4, own=3, files=["a_file", "b_file"], chunk=2))
     assert [len({member.file for member in members}) for members in parts.values()] == [1] * len(parts)
     assert sum(map(len, parts.values())) == 10 and list(parts)[:2] == ["robots_0000", "robots_0002"]
 
 
 @pytest.mark.parametrize(("key", "value"), [("field", ["nosuch"]), ("effects", ["nosuch"])])
 def test_unknown_names_are_refused(key, value):
-    section = {"field": ["paper"], "effects": ["backlash"], "files": []} | _NOT_AS_THEY_ARE
+    right = section(field=["paper"], effects=["backlash"])
     with pytest.raises(ConfigError, match=f"withheld.{key} has 'nosuch'"):
-        check(_CONFIG | {"withheld": section | {key: value}})
+        check(_CONFIG | {"withheld": right | {key: value}})
 
 
 @pytest.mark.parametrize(
@@ -294,10 +281,9 @@ def test_unknown_names_are_refused(key, value):
     [("nosuch", "robots has no 'nosuch'"), ("rrru3", "has the mjcf ''"), ("mine", "has the mjcf 'mine.xml'")],
 )
 def test_files_that_the_check_has_no_places_in_are_refused(file, message):
-    section = {"field": [], "effects": [], "files": []} | _NOT_AS_THEY_ARE
     for key in ("files", "as_robots_are_files"):
         with pytest.raises(ConfigError, match=message):
-            check(_CONFIG | {"withheld": section | {key: [file]}})
+            check(_CONFIG | {"withheld": section(**{key: [file]})})
 
 
 @pytest.mark.parametrize(

@@ -19,7 +19,7 @@ from rrru.studies.blind_validation.rivals import beliefs
 from rrru.studies.blind_validation.summary import compare_methods
 from rrru.studies.blind_validation.verdicts import in_order
 from tests.schemas import check
-from tests.studies.blind_validation.conditions import CONDITIONS, acting, bare
+from tests.studies.blind_validation.conditions import CONDITIONS, acting, bare, section
 
 _SETTINGS = GapSettings(("backlash", "axis_tilt", "thermal_growth"), draws=20)
 
@@ -162,9 +162,7 @@ def test_answers_are_scored_against_the_truth():
 
 
 def test_other_ways_are_tried_on_the_first_robots_of_the_label_check():
-    section = {"robots": 7, "per_effect": 1, "effects": ["backlash"], "per_noise": 0, "many": 0, "background": 0}
-    section |= {"chunk": 4, "methods": 5, "mujoco": 0, "own": 0, "files": []}
-    section |= {"as_robots_are": 0, "as_robots_are_files": []}
-    found = rivalled(section)
-    assert set(found) <= set(chunks(section))
+    asked = section(robots=7, per_effect=1, effects=["backlash"], methods=5)
+    found = rivalled(asked)
+    assert set(found) <= set(chunks(asked))
     assert [name for names in found.values() for name in names] == [f"label_{k:04d}" for k in range(5)]

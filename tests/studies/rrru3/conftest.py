@@ -2,7 +2,15 @@
 
 import pytest
 
-from rrru.studies.rrru3 import twin_descent
+from rrru.robots.rrru3 import Rrru3
+from rrru.studies.rrru3 import twin_descent, twin_search
+from tests.studies.rrru3.test_twin import CONFIGURED, MOTION, draws
+
+
+@pytest.fixture(scope="module")
+def task():
+    """A search over three draws."""
+    return twin_search.Task(Rrru3(), MOTION, CONFIGURED, 0.02, draws(0))
 
 
 @pytest.fixture(scope="module")

@@ -31,10 +31,10 @@ CONFIGURED = {
 }
 
 
-@pytest.fixture(scope="module")
-def task():
-    draws = twin_search.draw([[np.random.default_rng([k, part]) for part in range(2)] for k in range(3)], 222)
-    return twin_search.Task(Rrru3(), MOTION, CONFIGURED, 0.02, draws)
+def draws(first, count=3):
+    """Draws by the numbers of their streams."""
+    numbers = range(first, first + count)
+    return twin_search.draw([[np.random.default_rng([k, part]) for part in range(2)] for k in numbers], 222)
 
 
 @pytest.mark.parametrize("line_calibration", twin_search.LINE_CALIBRATIONS)

@@ -6,29 +6,17 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from rrru.robots.rrru3 import Rrru3
 from rrru.studies.rrru3 import study_numbers as numbers
 from rrru.studies.rrru3 import twin, twin_comparisons, twin_search
 from rrru.studies.rrru3.paper import ERRORS_MM
 from rrru.studies.rrru3.twin_objective import misfit, surprises
 from tests.schemas import check
-from tests.studies.rrru3.test_twin import CANDIDATE, CONFIGURED, MOTION
+from tests.studies.rrru3.test_twin import CANDIDATE, draws
 from tests.studies.rrru3.test_twin_restarts import SECTION
 
 SMALL = SECTION | {"hypotheses": {"restarts": 1, "evaluations": 90}, "tradeoff": {"evaluations": 90, "weights": [9.0]}}
 
 pytestmark = pytest.mark.usefixtures("short_descents")
-
-
-def draws(first, count=3):
-    return twin_search.draw(
-        [[np.random.default_rng([first + k, part]) for part in range(2)] for k in range(count)], 222
-    )
-
-
-@pytest.fixture(scope="module")
-def task():
-    return twin_search.Task(Rrru3(), MOTION, CONFIGURED, 0.02, draws(0))
 
 
 @pytest.fixture

@@ -5,21 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rrru.robots.rrru3 import Rrru3
 from rrru.studies.rrru3 import twin, twin_restarts, twin_search
 from rrru.studies.rrru3.schemas import TABLES
-from tests.studies.rrru3.test_twin import CANDIDATE, CONFIGURED, MOTION
+from tests.studies.rrru3.test_twin import CANDIDATE
 
 SECTION = {"seed": 3, "share": 0.02, "candidates": 2, "members": 3, "stall_descents": 50, "stall_nat": 0.1}
 SECTION |= {"evaluations": 350, "restarts": 2, "hours": 1.0, "hypotheses": {}}
 
 pytestmark = pytest.mark.usefixtures("short_descents")
-
-
-@pytest.fixture(scope="module")
-def task():
-    draws = twin_search.draw([[np.random.default_rng([k, part]) for part in range(2)] for k in range(3)], 222)
-    return twin_search.Task(Rrru3(), MOTION, CONFIGURED, 0.02, draws)
 
 
 @pytest.fixture(scope="module")

@@ -126,10 +126,17 @@ class Draw:
         """Name of the robot's file."""
         return "own.urdf" if self.kind == "urdf" else "own.xml"
 
-    def write(self, folder, rows, file):
-        """Write the robot's file and a file of rows."""
-        (Path(folder) / self.robot_file).write_text(self.nominal.text(self.kind))
+    @property
+    def file_rows(self):
+        """The noisy rows of the file: those of all stops but the fresh ones."""
+        return self.table(self.readings(self.poses()), True)[np.repeat(~self.stops.fresh, len(self.targets))]
+
+    def write(self, folder, rows, file="stops.csv"):
+        """Write the robot's file and a file of rows; returns the sections of the campaign and of the robot."""
+        robot = Path(folder) / self.robot_file
+        robot.write_text(self.nominal.text(self.kind))
         rows.to_csv(Path(folder) / file, index=False)
+        return self.section(folder, file), self.nominal.section(str(robot), self.kind)
 
 
 def draw(number, seed, most_stops, mujoco_share):

@@ -38,9 +38,7 @@ class Handed:
 
 def _right(own):
     """The correct file."""
-    exact = own.readings(own.poses())
-    rows = own.table(exact, True)[np.repeat(~own.stops.fresh, len(own.targets))]
-    return Handed(rows, own.section(".", "stops.csv"), own.nominal, (), own.targets)
+    return Handed(own.file_rows, own.section(".", "stops.csv"), own.nominal, (), own.targets)
 
 
 def _signs(handed, own, names):
@@ -267,11 +265,9 @@ def _kabsch(measured, said):
 
 def read(own, handed, folder):
     """The result of reading a file: accepted, refused or traceback, and the words."""
-    own = replace(own, nominal=handed.nominal)
-    own.write(folder, handed.rows, "stops.csv")
-    section = handed.section | {"ingest": str(folder / "stops.csv")}
+    section, robot = replace(own, nominal=handed.nominal).write(folder, handed.rows)
     try:
-        found = page.read(section, handed.nominal.section(str(folder / own.robot_file), own.kind))
+        found = page.read(handed.section | {"ingest": section["ingest"]}, robot)
     except RrruError as error:
         return "refused", str(error)
     # any other exception is a defect

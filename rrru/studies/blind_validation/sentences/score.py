@@ -3,7 +3,6 @@
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-import numpy as np
 import pandas as pd
 
 from rrru.errors import RrruError, SimulationError, UnreachableError
@@ -46,9 +45,7 @@ def statements(check, numbers, settings):
 def _of_page(number, settings, folder):
     """Name of a robot, its truth in words, and (kind, text, result) of each claim of its page."""
     own = _driven(number, settings)
-    rows = own.table(own.readings(own.poses()), True)
-    own.write(folder, rows[np.repeat(~own.stops.fresh, len(own.targets))], "stops.csv")
-    section, robot = own.section(folder, "stops.csv"), own.nominal.section(str(folder / own.robot_file), own.kind)
+    section, robot = own.write(folder, own.file_rows)
     try:
         run = page.run(own.name, section, robot, settings["config"])
     except RrruError as error:

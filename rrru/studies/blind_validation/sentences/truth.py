@@ -166,9 +166,7 @@ def _as_read(draw, run, readings, folder):
     digits = _DIGIT_MM * np.random.default_rng(0).standard_normal(np.shape(readings[0]))
     table = draw.table((readings[0] + digits, readings[1]), False)
     # fresh stops are between the others in time, and behind them in the file
-    draw.write(folder, table.assign(time_s=np.arange(len(table), dtype=float)), _ALL)
-    section = draw.section(folder, _ALL)
-    exact = page.read(section, draw.nominal.section(str(folder / draw.robot_file), draw.kind)).measurements
+    exact = page.read(*draw.write(folder, table.assign(time_s=np.arange(len(table), dtype=float)), _ALL)).measurements
     own, (seen, vectors) = run.measurements, readings
     seen = seen @ run.rotation.T + run.translation_mm
     exact = exact.assign(**rows.vector_columns("measured", seen), status="ok")
