@@ -11,7 +11,8 @@ _LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
 
 @cache
-def _cases(module):
+def cases(module):
+    """By name of a test, the cases of the YAML file of its module, a path."""
     return yaml.load(Path(module).with_suffix(".yaml").read_text(encoding="utf-8"), Loader=_LOADER)
 
 
@@ -19,7 +20,7 @@ def refusals(*names):
     """Decorator: a test's cases, lists of the arguments `names`, from the module's YAML file under the test's name."""
 
     def parametrized(test):
-        cases = _cases(inspect.getfile(test))[test.__name__]
-        return pytest.mark.parametrize(names, [tuple(case) for case in cases])(test)
+        found = cases(inspect.getfile(test))[test.__name__]
+        return pytest.mark.parametrize(names, [tuple(case) for case in found])(test)
 
     return parametrized

@@ -10,7 +10,7 @@ from rrru.campaign.ingest.campaign_file import IngestSpec, ingest
 from rrru.errors import IngestError
 from rrru.robots.rrru3 import Rrru3
 from tests.places import DATA
-from tests.refusals import refusals
+from tests.refusals import cases, refusals
 
 SOURCE = DATA / "field_01.csv"
 TEXT = SOURCE.read_text()
@@ -272,6 +272,11 @@ SETTINGS = {
 def test_a_campaign_that_makes_no_sense(case, row, column, value, allowed, tmp_path):
     problems = problems_of(CONTENT[case], tmp_path, **SETTINGS.get(case, {}))
     assert_problem(problems, row, column, value, allowed)
+
+
+def test_every_campaign_that_makes_no_sense_has_its_words():
+    known = {name for name, *_ in cases(__file__)["test_a_campaign_that_makes_no_sense"]}
+    assert known == CONTENT.keys() and known > SETTINGS.keys()
 
 
 @pytest.mark.parametrize(
