@@ -61,6 +61,7 @@ class Prediction:
         unit = 1.0 / np.sqrt(np.maximum(np.diag(gram), 1e-300))
         root = np.linalg.cholesky(unit[:, None] * gram * unit + 1e-12 * np.eye(len(unit)))
         moment = solve_triangular(root, unit[:, None] * (design.T @ data), lower=True)
+        planned = [_condensed(*one) for one in planned]
         shape = len(planned), max(len(one) for one, _ in planned)
         errors, spreads = np.zeros((*shape, data.shape[1])), np.zeros((*shape, len(unit)))
         for number, (columns, simulated) in enumerate(planned):
@@ -86,6 +87,15 @@ class Prediction:
         moment = solve_triangular(root, own.T @ error, lower=True)
         spread = solve_triangular(root, self.spread.reshape(-1, len(root)).T, lower=True).T.reshape(self.spread.shape)
         return Prediction(self.errors - spread @ moment, spread, self.now_nats + gains)
+
+
+def _condensed(design: FloatArray, data: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """A design (m, k) and data (m, s) turned into as few rows with the same products."""
+    width = design.shape[1]
+    if len(design) <= width + data.shape[1]:
+        return design, data
+    _, root = np.linalg.qr(np.concatenate([design, data], axis=1))
+    return root[:, :width], root[:, width:]
 
 
 @dataclass(frozen=True)
@@ -193,7 +203,7 @@ def contests(inference: InferenceResult, answers: Sequence[RivalAnswer], planned
                 owner += [len(pairs)] * (sets.stop - sets.start)
                 pairs.append((truth, rival) if truth.probability >= rival.probability else (rival, truth))
                 errors = prediction.errors[..., sets]
-                apart.append(np.sqrt((errors**2).sum() / max(np.count_nonzero(errors), 1)))
+                apart.append(np.sqrt((errors**2).sum() / max(errors.shape[-1] * data[1].size, 1)))
         if terms[place]:
             coefficients = _coefficients(inference, rival)
             made.append([np.concatenate(some, axis=-1) @ coefficients for some in columns])
