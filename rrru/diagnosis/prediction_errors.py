@@ -33,3 +33,9 @@ def prediction_errors(fit: ModelFit) -> FloatArray:
         left = turned @ (turned.T @ known[here].ravel() / np.maximum(1.0 - taken, _LEAST_LEFT))
         result[here] = left.reshape(-1, 3)
     return np.asarray(result * problem.axis_mm)
+
+
+def prediction_rms_mm(fit: ModelFit) -> float:
+    """Root mean square length in mm of the prediction errors of a fit, without the noise of the readings themselves."""
+    squares = (prediction_errors(fit) ** 2).sum(axis=1).mean() - (fit.model.problem.axis_mm**2).sum()
+    return float(np.sqrt(max(squares, 0.0)))

@@ -113,8 +113,8 @@ def test_every_number_of_a_cause_of_several_legs_has_its_place_and_the_cause_tho
 
 
 def test_the_error_to_expect_of_a_corrected_file_holds_what_the_diagnosis_leaves():
-    """Distance of the file from the diagnosis and that of the diagnosis from the robot: squares add."""
-    file = {"file_error_mm": 0.03, "file_error_fresh_mm": 0.04, "gap_after_rms_mm": 0.03}
+    """It is next to the distance of the file from the diagnosis and that of the diagnosis from the robot."""
+    file = {"file_error_mm": 0.03, "file_error_fresh_mm": 0.04, "gap_after_rms_mm": 0.03, "file_expected_mm": 0.05}
     facts = answered(**file)
     assert facts["corrected_file"]["expected_mm"] == pytest.approx(0.05)
     assert "0.030 mm at held-out points. With it 0.050 mm are to be expected" in " ".join(card(facts).worth)

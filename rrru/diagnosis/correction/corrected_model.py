@@ -25,7 +25,7 @@ from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.problem import DiagnosisProblem
 from rrru.diagnosis.result_notes import payload_notes
 from rrru.diagnosis.shrink import model_row
-from rrru.diagnosis.verdict_facts import NOT_CORRECTED, expected_mm
+from rrru.diagnosis.verdict_facts import NOT_CORRECTED
 from rrru.effects.library import active_effects
 from rrru.effects.protocol import Motion, together
 from rrru.errors import ConfigError, SimulationError, UnreachableError
@@ -64,9 +64,11 @@ def write_corrected(
         more, why = gap_rows(inference, written, section, file, shrink)
         _refuse_worse(more)
         error = file_error(inference, _model(inference, written, section, file), masses, stream(seed, "fresh poses"))
-        sizes = {"file_error_mm": error.measured_mm, "file_error_fresh_mm": error.fresh_mm}
-        expected = expected_mm(diagnosis.verdict | sizes)
-        worth = sizes | {
+        expected = _expected_mm(diagnosis, written, error)
+        worth = {
+            "file_error_mm": error.measured_mm,
+            "file_error_fresh_mm": error.fresh_mm,
+            "file_expected_mm": expected,
             "file_remainder": _remainder(shrink, more, written, inference, expected),
             "file_headline": _headline(written, error),
         }
@@ -79,6 +81,17 @@ def write_corrected(
     verdict = diagnosis.verdict | worth | {"notes": notes, "not_in_model": "; ".join(lost)}
     tables = {"gap_shrink": shrink, "corrected_drives": corrected_drives(inference, masses)}
     return replace(diagnosis, verdict=verdict, tables=diagnosis.tables | tables)
+
+
+def _expected_mm(diagnosis: Diagnosis, written: Corrected, error: "FileError") -> float:
+    """Error in mm to expect of a corrected file's robot at poses and loads like those measured.
+
+    Its distance from the diagnosed robot and the error of that one at held-out points are independent: squares add. The
+    numbers of a file that cannot hold an effect are fitted to the readings at which that distance is taken, so that
+    what their fit leaves at left-out stops is the better estimate where it is larger.
+    """
+    distance_mm = np.fmax(error.measured_mm, error.fresh_mm)
+    return max(float(np.hypot(distance_mm, diagnosis.verdict["gap_after_rms_mm"])), written.predicted_mm)
 
 
 def _left_mm(steps: pd.DataFrame, kind: str) -> float:
