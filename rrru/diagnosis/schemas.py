@@ -265,6 +265,7 @@ command_{xyz}_mm       float  where the tool shall stand, robot frame
 command_r{xyz}_rad     float  the platform's orientation there, that of the nearest measured point, rotation vector
 payload_kg             float  the campaign's largest
 time_s                 float  since the campaign's start: its end, as warm the robot is
+temperature_c          float? of the campaign's last point, in degrees Celsius; null where the file has none
 
 ## gap_points | campaigns/{campaign}/gap_points.parquet | run point
 The gap at every commanded point, before and after the effects are added to the model.

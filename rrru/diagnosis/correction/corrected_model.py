@@ -335,7 +335,7 @@ def _fresh_differences(
     """Vectors (n, 3) from the file's robot to the diagnosed one at fresh poses, NaN where one of them has none.
 
     The drive values are weighted means of those at three measured poses, so that they lie within the measured range.
-    Payload and time are those of one of the three, and each drive comes from either side: an effect makes the error
+    Payload, time and temperature are those of one of the three, and each drive comes from either side: an effect makes the error
     that it has in the campaign, and the backlashes of several drives add up as independent errors.
     """
     problem = inference.problem
@@ -350,8 +350,9 @@ def _fresh_differences(
     closed = np.flatnonzero(poses.closed)
     drive, approach, like = drive[closed], approach[closed], picks[closed, 0]
     position = robot.measured(poses.of(closed), robot.twists())
-    conditions = (np.nan_to_num(values[like]) for values in (problem.motion.payload_kg, problem.motion.time_s))
-    motion = at_rest(robot, masses, (position, drive, *conditions), approach, drive)
+    payload, time_s = (np.nan_to_num(values[like]) for values in (problem.motion.payload_kg, problem.motion.time_s))
+    state = position, drive, payload, time_s, problem.motion.temperature_c[like]
+    motion = at_rest(robot, masses, state, approach, drive)
     readings = None if problem.readings is None else problem.readings.of(like)
     diagnosed, written = (
         robot.twists(inference.state.deviations) + effect_twists(inference, motion),
