@@ -335,8 +335,8 @@ def _fresh_differences(
     """Vectors (n, 3) from the file's robot to the diagnosed one at fresh poses, NaN where one of them has none.
 
     The drive values are weighted means of those at three measured poses, so that they lie within the measured range.
-    Payload, time and temperature are those of one of the three, and each drive comes from either side: an effect makes the error
-    that it has in the campaign, and the backlashes of several drives add up as independent errors.
+    Payload, time and temperature are those of one of the three, and each drive comes from either side: an effect makes
+    the error that it has in the campaign, and the backlashes of several drives add up as independent errors.
     """
     problem = inference.problem
     robot, (actuators, command) = problem.mechanism, problem.driven

@@ -340,7 +340,8 @@ def test_the_stated_error_of_a_corrected_file_is_that_from_the_true_robot(name, 
     picks, share = generator.integers(len(measured), size=(200, 2)), generator.random((200, 1))
     drive, near = (share * one[picks[:, 0]] + (1.0 - share) * one[picks[:, 1]] for one in (measured, command))
     place = robot.forward(drive, guess_mm=near)
-    motion = at_rest(robot, _MASSES, (place, drive, 0.0, 0.0, np.nan), generator.choice([-1.0, 1.0], drive.shape), drive)
+    approach = generator.choice([-1.0, 1.0], drive.shape)
+    motion = at_rest(robot, _MASSES, (place, drive, 0.0, 0.0, np.nan), approach, drive)
     twists = robot.twists_of(campaign.errors) + together(active_effects(campaign.effects, robot), motion).twists
     true = robot.measured(robot.solve(drive, place, twists), twists)
     key = "mjcf" if "mjcf" in section else "urdf"
