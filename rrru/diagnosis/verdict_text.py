@@ -347,8 +347,12 @@ def _left(facts: Facts) -> list[str]:
     what = " and ".join(filter(None, (named, further)))
     size = f"{rounded(facts['gap_after_rms_mm'])} mm; the {_noise(facts)}"
     said = [f"With {what} in the simulator the residual error at left-out points is {size}."]
-    if facts["gap_rms_mm"] <= facts["gap_after_rms_mm"] and facts["gap_rms_mm"] < facts["noise_rms_mm"]:
+    if facts["gap_rms_mm"] > facts["gap_after_rms_mm"]:
+        return said
+    if facts["gap_rms_mm"] < facts["noise_rms_mm"]:
         said.append("That it shrinks cannot be seen at these points: it is too small relative to the noise.")
+    else:
+        said.append(f"At these points it is no smaller than without {what}: another cause may act.")
     return said
 
 

@@ -113,6 +113,7 @@ _CASES = [
     ("it is random error", ({"share": "0"}, {}, _FACTS), ({}, {}, _FACTS)),
     ("what is left with it", ({"value": "0.011"}, {}, _FACTS), ({"value": "0.05"}, {}, _FACTS)),
     ("that it shrinks cannot be seen", ({}, {"before_mm": 0.02}, _FACTS), ({}, {}, _FACTS)),
+    ("it does not shrink", ({}, {"after_mm": 0.5}, _FACTS), ({}, {}, _FACTS)),
     ("next, a run", ({"run": "stops in reverse"}, {}, _FACTS), ({"run": "line_9 once more"}, {}, _FACTS)),
     ("next, none is advised", ({}, _UNKNOWN, _OUTSIDE), ({}, {}, _OUTSIDE)),
     (

@@ -81,6 +81,7 @@ _SENTENCES = {
     "what is left with it": rf"With {_MODEL} in the simulator the residual error at left-out points is {_X} mm; "
     rf"the {_NOISE}\.",
     "that it shrinks cannot be seen": r"That it shrinks cannot be seen at these points: .*",
+    "it does not shrink": r"At these points it is no smaller than without .*: another cause may act\.",
     "these data cannot rule out": r"(?:These data cannot rule out|Parts of the unexplained share could be): "
     r"(?P<names>.*)\.",
     "next, a run": r"Next: (?:drive|measure) (?P<run>.*)\. That (?:decides|would help to decide) "
