@@ -236,6 +236,18 @@ def test_a_gap_above_the_noise_that_is_no_smaller_with_its_cause_is_said_to_be_n
     assert said not in answered(effects="link_flexure", **sizes | {"gap_after_rms_mm": 0.02})["sentences"]
 
 
+def test_what_is_left_next_to_a_ruled_out_effect_is_no_share_of_what_is_unexplained():
+    """An arm whose fourth joint moves the fifth: "no effect of the library explains it: 12 % of it is like none"."""
+    budget = synthetic_gap.gap_budget(CAMPAIGN)
+    effect = budget["kind"] == "effect"
+    budget.loc[effect, ["share", "probability"]] = 1.0, 1.0
+    said = "It is systematic, and no effect of the library explains it at left-out points."
+    assert said in answered(budget, effects="unexplained", leg=0)["sentences"]
+    assert [claim.kind for claim in claims._of_text(said, claims._SENTENCES)] == ["something is unexplained"]
+    budget.loc[effect, "probability"] = 0.05
+    assert said not in answered(budget, effects="unexplained", leg=0)["sentences"]
+
+
 def test_a_cause_of_the_corrected_model_without_a_name_has_a_sentence_with_its_share():
     budget = synthetic_gap.gap_budget(CAMPAIGN)
     own = budget["part"] == "backlash"
@@ -521,7 +533,9 @@ def test_what_the_unexplained_follows_is_said_where_one_variable_predicts_most_o
 def test_where_nothing_acts_or_the_library_lacks_it_no_effect_is_blamed():
     nothing = " ".join(answered(effects="none", leg=0, confounded_with="")["sentences"])
     assert "these data show no systematic error" in nothing and " is backlash" not in nothing
-    unknown = " ".join(answered(effects="unexplained", leg=0)["sentences"])
+    budget = synthetic_gap.gap_budget(CAMPAIGN)
+    budget.loc[budget["kind"] == "effect", "probability"] = 0.05
+    unknown = " ".join(answered(budget, effects="unexplained", leg=0)["sentences"])
     assert (
         "no effect of the library explains it: 5 % (95 %: 4 % to 6 %) of it" in unknown
         and " is backlash" not in unknown

@@ -62,7 +62,8 @@ _SENTENCES = {
     r"together, .*",
     "shares overlap": r"These shares add up to more than the gap.*",
     "something is unexplained": rf"(?:Another|It is systematic, and no effect .*:) "
-    rf"(?:(?P<share>{_NUMBER}) %|(?:an )?undetermined share) .*",
+    rf"(?:(?P<share>{_NUMBER}) %|(?:an )?undetermined share) .*"
+    r"|It is systematic, and no effect of the library explains it at left-out points\.",
     "no cause is sure": r"No cause is probable enough to be named; .*",
     "more acts": r"More acts than the named causes, .*",
     "the unexplained follows": r"The unexplained part follows .*",
