@@ -270,6 +270,7 @@ def _row(
         "no_answer": verdict.no_answer,
         "file_error_mm": np.nan,
         "file_error_fresh_mm": np.nan,
+        "file_expected_mm": np.nan,
         "file_remainder": "",
         "file_headline": "",
     }

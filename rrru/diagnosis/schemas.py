@@ -61,6 +61,9 @@ no_answer              str    why no cause is named and no corrected file is wri
 file_error_mm          float? rms distance of the corrected file's robot from the diagnosed one at the measured poses;
     null where no file was corrected
 file_error_fresh_mm    float? the same at 200 fresh poses between the measured ones
+file_expected_mm       float? error to expect of the corrected file's robot at poses and loads like those measured: of
+    its larger distance from the diagnosed one and gap_after_rms_mm, squares added; where the file cannot hold an
+    effect, not below what its own fit leaves at left-out stops
 file_remainder         str    what the corrected file leaves beyond the diagnosis and what to use; empty where nothing
 file_headline          str    that the corrected file is worse than the calibration, and why; empty where it is not
 
@@ -263,6 +266,7 @@ command_{xyz}_mm       float  where the tool shall stand, robot frame
 command_r{xyz}_rad     float  the platform's orientation there, that of the nearest measured point, rotation vector
 payload_kg             float  the campaign's largest
 time_s                 float  since the campaign's start: its end, as warm the robot is
+temperature_c          float? of the campaign's last point, in degrees Celsius; null where the file has none
 
 ## gap_points | campaigns/{campaign}/gap_points.parquet | run point
 The gap at every commanded point, before and after the effects are added to the model.

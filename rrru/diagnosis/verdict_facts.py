@@ -80,7 +80,7 @@ def _corrected_file(verdict: Facts) -> dict[str, Any] | None:
         return None
     return {
         **{key: verdict[f"file_{key}"] if known else None for key in ("error_mm", "error_fresh_mm")},
-        "expected_mm": expected_mm(verdict) if known else None,
+        "expected_mm": verdict["file_expected_mm"] if known else None,
         "remainder": verdict["file_remainder"],
         "headline": verdict["file_headline"],
         "not_in_model": [one for one in verdict["not_in_model"].split("; ") if one],
@@ -92,16 +92,6 @@ def not_corrected(facts: Facts) -> str:
     file = facts.get("corrected_file")
     lacking = "; ".join(file["not_in_model"]) if file else ""
     return lacking if lacking.startswith(NOT_CORRECTED) else ""
-
-
-def expected_mm(verdict: Facts) -> float:
-    """Error in mm to expect of a corrected file's robot at poses and loads like those measured.
-
-    Its distance from the diagnosed robot and the error of that one at held-out points are independent: squares add.
-    verdict: the row of `gap_verdicts`.
-    """
-    distances = [verdict[key] for key in ("file_error_mm", "file_error_fresh_mm")]
-    return float(np.hypot(np.fmax(*distances), verdict["gap_after_rms_mm"]))
 
 
 def _row(values: Facts, names: Iterable[str]) -> dict[str, Any]:

@@ -152,12 +152,28 @@ def _causes(facts: Facts) -> list[str]:
         if said:
             another = f"Another {share.removeprefix('an ')}"
             said.append(f"{another} is systematic and like no effect of the library.")
+        elif _has_vetoed(facts):
+            said.append("It is systematic, and no effect of the library explains it at left-out points.")
         else:
             said.append(
                 f"It is systematic, and no effect of the library explains it: {share} of it is like none of them."
             )
         said += [*_looks_like(facts["unexplained_follows"]), *_possible(facts)]
     return [*said, *_sure(facts, groups)] if said else []
+
+
+def _has_vetoed(facts: Facts) -> bool:
+    """Whether an effect has a probability of a name and a part of the gap, and neither name nor place in the model.
+
+    Cross-validation has ruled it out. What the readings leave with it is no share of what is unexplained without it.
+    """
+    return any(
+        part["kind"] == "effect"
+        and part["part"] not in facts["unnamed"]
+        and part["probability"] >= OPTIONS.min_named_probability
+        and part["share"] >= OPTIONS.min_mentioned_share
+        for part in facts["budget"]
+    )
 
 
 def _possible(facts: Facts) -> list[str]:
@@ -347,8 +363,12 @@ def _left(facts: Facts) -> list[str]:
     what = " and ".join(filter(None, (named, further)))
     size = f"{rounded(facts['gap_after_rms_mm'])} mm; the {_noise(facts)}"
     said = [f"With {what} in the simulator the residual error at left-out points is {size}."]
-    if facts["gap_rms_mm"] <= facts["gap_after_rms_mm"] and facts["gap_rms_mm"] < facts["noise_rms_mm"]:
+    if facts["gap_rms_mm"] > facts["gap_after_rms_mm"]:
+        return said
+    if facts["gap_rms_mm"] < facts["noise_rms_mm"]:
         said.append("That it shrinks cannot be seen at these points: it is too small relative to the noise.")
+    else:
+        said.append(f"At these points it is no smaller than without {what}: another cause may act.")
     return said
 
 

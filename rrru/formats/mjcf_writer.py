@@ -5,6 +5,7 @@ Lengths in mm and angles in rad, m in the file.
 """
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import TypeAlias
 from xml.etree.ElementTree import Element
@@ -18,7 +19,7 @@ from rrru.formats.mjcf_home import close_keys
 from rrru.formats.mjcf_reader import MEASURED_TOOL, MM, ends_of
 from rrru.formats.mjcf_text import MjcfDocument
 from rrru.formats.robot_file import mjcf_parts
-from rrru.formats.structure import Structure, structure_of
+from rrru.formats.structure import Structure, meeting_at_home, structure_of
 from rrru.formats.xml_text import quaternion, sizes, words
 
 _TURNS = ("quat", "axisangle", "xyaxes", "zaxis", "euler")
@@ -35,6 +36,7 @@ def to_mjcf(path: str | Path, platform: str, found: Found, folder: Path) -> tupl
     """
     structure = structure_of(*mjcf_parts(path, platform))
     document, model = MjcfDocument(structure.assembly.file), structure.assembly.model
+    found = replace(found, twists=meeting_at_home(structure, found.twists))
 
     def numbers(twists: TwistsBySite) -> dict[_Key, np.ndarray]:
         return _numbers(structure, found, twists)

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from rrru.formats.chains import Chains, Cut, with_bars
 from rrru.formats.couplings import JointCoupling, coupling_matrix
-from rrru.formats.joint_graph import Move, inverse_placement
+from rrru.formats.joint_graph import Move, inverse_placement, placed
 from rrru.formats.mjcf_reader import Assembly
 from rrru.kinematics.chain import PoseGuess, Twists, bar_pose, walk
 from rrru.kinematics.closure import Closure
@@ -25,6 +25,8 @@ from rrru.kinematics.mobility import free_motions
 _MAX_OPEN_MM = 1.0
 # closure error that may remain after closing it, where redundant joints do not fit each other; assumed
 _MAX_REMAINING_MM = 0.01
+# steps to legs that meet, of which each leaves what is of second order in their errors
+_MEETING_STEPS = 5
 # closure error below which it is closed already: rounding
 _CLOSED_MM = 1e-9
 
@@ -89,10 +91,42 @@ def structure_of(
     return Structure(assembly, chains, open_legs, cuts, legs, servos, couplings, up)
 
 
+def meeting_at_home(structure: Structure, twists: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Twists (6,) by site under which legs with redundant joints meet at home, with the platform where it was.
+
+    Small errors of such legs contradict each other, as tilts of the cranks of a planar loop do, and the model meets
+    them by least squares: at the pose T of the platform leg i ends at E_i. Moved as a whole by T E_i^-1 it ends there.
+    Legs that meet already, legs with bars, whose lengths are measured by what they contradict each other in, and legs
+    that share a moving joint stay.
+    """
+    legs, home, result = structure.legs, structure.legs.home_drives[None], dict(twists)
+    first = [next((j.name for j in leg.joints if j.kind != "fixed"), "") for leg in legs.legs]
+    if len(set(first)) < len(first) or any(leg.bar for leg in legs.legs):
+        return result
+    closure = Closure(legs)
+    start = PoseGuess(legs.home_mm[None], legs.home_turn[None], legs.home_passive[None])
+    for _ in range(_MEETING_STEPS):
+        values = Twists(legs, np.stack([result.get(site, np.zeros(6)) for site in legs.sites]))
+        poses = closure.solve(home, start, values.values)
+        if not poses.closed.all() or _gaps(legs, poses, values).max() <= _MAX_REMAINING_MM:
+            break
+        platform = placed(poses.position_mm[0], poses.turn[0])
+        for leg, site in zip(legs.legs, first, strict=True):
+            way, number = walk(legs, leg, home, poses.passive, values), legs.site_numbers[site]
+            joint = next(k for k, one in enumerate(leg.joints) if one.name == site)
+            twist, turn = values.values[0, number], way.turns[joint, 0]
+            seat = placed(way.places[joint, 0] - turn @ twist[:3], turn)
+            moved = platform @ inverse_placement(placed(way.place[0], way.turn[0]))
+            seated = placed(twist[:3], Rotation.from_rotvec(twist[3:]).as_matrix())
+            new = inverse_placement(seat) @ moved @ seat @ seated
+            result[site] = np.concatenate([new[:3, 3], Rotation.from_matrix(new[:3, :3]).as_rotvec()])
+    return result
+
+
 def _closed(assembly: Assembly, legs: Legs, up: tuple[float, float, float]) -> Legs:
     """Legs whose home pose closes all loops next to the file's; raises ConfigError where it cannot."""
     start = PoseGuess(legs.home_mm[None], legs.home_turn[None], legs.home_passive[None])
-    gaps = _gaps(legs, start)
+    gaps = _gaps(legs, start, Twists(legs))
     if gaps.max() > _MAX_OPEN_MM:
         joints = ", ".join(assembly.names_along(assembly.paths[gaps.argmax()]))
         text = f"the leg through {joints} misses the platform by {gaps.max():.3f} mm at the home pose"
@@ -103,7 +137,7 @@ def _closed(assembly: Assembly, legs: Legs, up: tuple[float, float, float]) -> L
     if gaps.max() < _CLOSED_MM:
         return legs
     poses = Closure(legs).solve(legs.home_drives[None], start)
-    left = _gaps(legs, poses).max() if poses.closed.all() else gaps.max()
+    left = _gaps(legs, poses, Twists(legs)).max() if poses.closed.all() else gaps.max()
     if left > _MAX_REMAINING_MM:
         raise assembly.error(f"the loops stay open by {left:.3f} mm; allowed: up to {_MAX_REMAINING_MM:g} mm")
     homes = dict(zip((joint.name for joint in legs.passive_joints), poses.passive[0], strict=True))
@@ -114,12 +148,12 @@ def _closed(assembly: Assembly, legs: Legs, up: tuple[float, float, float]) -> L
     return replace(legs, legs=chains, home_mm=poses.position_mm[0], home_turn=poses.turn[0])
 
 
-def _gaps(legs: Legs, poses: PoseGuess) -> np.ndarray:
-    """Closure error (legs,) in mm of every leg at one pose with drives at home.
+def _gaps(legs: Legs, poses: PoseGuess, twists: Twists) -> np.ndarray:
+    """Closure error (legs,) in mm of every leg at one pose with drives at home, under Twists.
 
     Of an end without a bar: its distance, and its angle in rad times CHARACTERISTIC_LENGTH_MM.
     """
-    result, actuators, twists = [], legs.home_drives[None], Twists(legs)
+    result, actuators = [], legs.home_drives[None]
     for leg in legs.legs:
         way = walk(legs, leg, actuators, poses.passive, twists)
         if leg.bar:

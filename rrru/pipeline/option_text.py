@@ -29,8 +29,8 @@ _KEYS = (
     "time_format",
     "targets",
 )
-# one of _KEYS in a message, with its value as YAML writes it in a line
-_STATED = re.compile(rf"\b({'|'.join(_KEYS)}): (\{{[^{{}}]*\}}|\[[^\[\]]*\]|[\w.]+)")
+# one of _KEYS in a message, with its value as YAML writes it in a line; a word before a colon is no value
+_STATED = re.compile(rf"\b({'|'.join(_KEYS)}): (\{{[^{{}}]*\}}|\[[^\[\]]*\]|[\w.]+\b(?!:))")
 # the message on a tool that is elsewhere states its place, which is a key of the robot
 _TOOL = re.compile(r"\ba tool at \(([^()]*)\) mm")
 

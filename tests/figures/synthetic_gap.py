@@ -34,7 +34,7 @@ def gap_verdicts(campaign, effects="link_flexure+backlash", **changes):
     texts = {"confounded_with": "drive_compliance", "next_runs": NEXT, "noise_from": "repeats"}
     texts["where"] = "leg 2 wrist, leg 1 drive to leg 3 drive"
     numbers = {"probability": 0.97, "leg": 2, "noise_rms_mm": NOISE_MM, "gap_rms_mm": 0.37, "gap_after_rms_mm": 0.02}
-    numbers |= {"file_error_mm": np.nan, "file_error_fresh_mm": np.nan}
+    numbers |= {"file_error_mm": np.nan, "file_error_fresh_mm": np.nan, "file_expected_mm": np.nan}
     numbers |= {"noise_stated_mm": 0.02, "noise_correlation": 0.1, "noise_runs_mm": 0.005}
     numbers |= {
         "searches_apart": 0.01,

@@ -2,7 +2,7 @@
 
 import pytest
 
-from rrru.pipeline.option_text import as_command
+from rrru.pipeline.option_text import as_command, options_in
 
 _SECTION = {"robot": "mine", "ingest": "my file.csv", "frame": "register"}
 
@@ -18,3 +18,10 @@ def test_a_command_has_the_file_of_a_robot_and_its_keys():
 )
 def test_a_robot_that_the_options_do_not_describe_has_no_command(entry):
     assert as_command(_SECTION, entry) == ""
+
+
+def test_a_frame_that_is_described_is_no_option():
+    """--frame columns, which the command refuses, was said of "a right-handed frame: columns: {..}"."""
+    exchanged = "{measured_x_mm: measured_y_mm, measured_y_mm: measured_x_mm}"
+    message = f"allowed: a right-handed frame: columns: {exchanged}, which leaves 0.877 mm rms"
+    assert options_in(message) == [f"--set 'columns={exchanged}'"]

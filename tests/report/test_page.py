@@ -70,7 +70,12 @@ def _with_file(folder, **verdict):
 def test_errors_of_a_corrected_file_are_next_to_its_link(folder):
     remains = "this URDF holds the geometry only and not backlash: 0.54 mm rms remain; use corrected_drives.parquet"
     text = _with_file(
-        folder, file_error_mm=0.31, file_error_fresh_mm=0.54, file_remainder=remains, not_in_model="backlash"
+        folder,
+        file_error_mm=0.31,
+        file_error_fresh_mm=0.54,
+        file_expected_mm=0.54,
+        file_remainder=remains,
+        not_in_model="backlash",
     )
     link = text.index(f'<a href="campaigns/{CAMPAIGN}/corrected.urdf">')
     worth = text.index("It is 0.31 mm rms off the diagnosed robot at the measured poses, 0.54 mm at 200 fresh ones.")
@@ -81,20 +86,20 @@ def test_errors_of_a_corrected_file_are_next_to_its_link(folder):
 @pytest.mark.parametrize("registered", [True, False])
 def test_the_errors_of_a_file_are_said_to_be_those_of_the_points_that_were_read(registered):
     """A palletiser whose reflector was right to 0.012 mm had a tool that was 0.44 mm off."""
-    facts = answered(file_error_mm=0.31, file_error_fresh_mm=0.54)
+    facts = answered(file_error_mm=0.31, file_error_fresh_mm=0.54, file_expected_mm=0.54)
     said = " ".join(cards.card(facts, found=Worth(144, 1.5, 0.05, registered)).worth)
     assert ("the tool and other points of the platform may be off by more" in said) == registered
 
 
 def test_a_corrected_file_without_fresh_poses_says_so(folder):
-    text = _with_file(folder, file_error_mm=0.31, file_error_fresh_mm=np.nan)
+    text = _with_file(folder, file_error_mm=0.31, file_error_fresh_mm=np.nan, file_expected_mm=0.31)
     said = "It is 0.31 mm rms off the diagnosed robot at the measured poses, at the fresh ones it has no pose."
     assert said in text
 
 
 _UNKNOWN = (
     {"file_error_mm": np.nan, "not_in_model": "backlash"},
-    {"file_error_mm": 0.3, "file_error_fresh_mm": np.nan},
+    {"file_error_mm": 0.3, "file_error_fresh_mm": np.nan, "file_expected_mm": 0.3},
     {"noise_stated_mm": np.nan, "gap_after_rms_mm": 0.0},
     {"effects": "unexplained", "leg": 0, "follows": [("the time", 0.9, np.nan, "s", 0.1)]},
     {"runs": (("line_1 once more", "run", "line_1", False, np.nan, np.nan, 26, "backlash / none", np.nan),)},
@@ -123,7 +128,8 @@ def test_a_corrected_file_that_is_worse_than_the_calibration_is_the_headline(fol
     headline = (
         "the corrected file has a residual error of 0.35 mm rms, the calibration one of 0.009 mm; it cannot hold: ball1"
     )
-    text = _with_file(folder, file_error_mm=0.3, file_error_fresh_mm=0.3, file_headline=headline, not_in_model="ball1")
+    sizes = {"file_error_mm": 0.3, "file_error_fresh_mm": 0.3, "file_expected_mm": 0.3}
+    text = _with_file(folder, file_headline=headline, not_in_model="ball1", **sizes)
     assert f'<p class="lead">T{headline[1:]}.</p>' in text
 
 
@@ -136,7 +142,7 @@ def test_a_file_that_was_not_corrected_has_no_link_but_a_reason(folder):
 
 
 def test_a_corrected_file_that_is_the_diagnosed_robot_is_off_by_no_rounding(folder):
-    text = _with_file(folder, file_error_mm=1.1e-9, file_error_fresh_mm=0.0)
+    text = _with_file(folder, file_error_mm=1.1e-9, file_error_fresh_mm=0.0, file_expected_mm=0.02)
     assert "It is less than 0.001 mm rms off the diagnosed robot at the measured poses, less than 0.001 mm at" in text
 
 

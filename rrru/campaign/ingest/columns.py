@@ -35,6 +35,7 @@ _ALL_COORDINATES = ", since a reading needs all three coordinates (a height alon
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 _DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+([eE][+-]?\d+)?", re.ASCII)
+_OR_NO_ROW = "; drop a row that lacks one"
 # larger numbers are no measurements, but damaged cells or markers of missing values
 _MAX_NUMBER = 1e12
 _Limit: TypeAlias = tuple[Callable[[pd.Series], pd.Series], str]
@@ -219,7 +220,7 @@ def _numbers(
 def _number(cell: Cell, comma: bool) -> float | str:
     """A cell's number, or for a cell without a finite one a text: what is allowed there."""
     if cell is None or _blank(cell):
-        return "a number; drop a row that lacks one"
+        return f"a number{_OR_NO_ROW}"
     number = np.inf
     if isinstance(cell, str):
         text = cell.strip()
@@ -232,7 +233,7 @@ def _number(cell: Cell, comma: bool) -> float | str:
             number = float(text)
     elif isinstance(cell, (int, float, Decimal)) and not isinstance(cell, bool):
         number = float(cell)
-    return number if abs(number) < _MAX_NUMBER else "a finite number"
+    return number if abs(number) < _MAX_NUMBER else f"a finite number{_OR_NO_ROW}"
 
 
 def _names(ours: str, cells: Sequence[Cell], rows: Sequence[int], theirs: str, problems: Problems) -> list[str]:

@@ -45,7 +45,7 @@ _NAMED = {
     "speed_mm_s": ("speed", "velocity", "v", "feed", "geschwindigkeit", "vorschub"),
     "payload_kg": ("payload", "load", "last", "nutzlast"),
     "temperature_c": ("temperature", "temp", "measurement temperature", "temperatur"),
-    "target": ("target", "reflector", "marker", "reflektor"),
+    "target": ("target", "reflector", "marker", "reflektor", "ziel", "marke"),
 }
 # words before or after an axis in exports of laser trackers, total stations, photogrammetry and CMMs
 _INSTRUMENTS = (

@@ -19,6 +19,7 @@ from rrru.diagnosis.calibrate import calibrate
 from rrru.diagnosis.inference import InferenceResult, with_effects
 from rrru.diagnosis.model_fit import fit_model
 from rrru.diagnosis.options import OPTIONS
+from rrru.diagnosis.prediction_errors import prediction_rms_mm
 from rrru.diagnosis.problem import DiagnosisProblem
 from rrru.diagnosis.result_notes import payload_notes
 from rrru.diagnosis.result_tables import acting_places, parameter_rows
@@ -38,14 +39,16 @@ class Corrected:
     """A corrected file.
 
     text; not_in_model: what it cannot hold, in words; lacking: the effects among these; found: what there is to hold;
-    in_file: values by parameter of the effects that it holds in addition to geometry; mjcf: whether it is an MJCF, not
-    a URDF.
+    in_file: values by parameter of the effects that it holds in addition to geometry; predicted_mm: rms error with
+    which its own fit predicts stops that are left out of it, 0 where it holds all effects; mjcf: whether it is an MJCF,
+    not a URDF.
     """
 
     text: str
     not_in_model: tuple[str, ...]
     lacking: tuple[str, ...]
     found: Found
+    predicted_mm: float = 0.0
     in_file: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     mjcf: bool = False
 
@@ -159,7 +162,9 @@ def corrected(inference: InferenceResult, section: dict[str, Any], folder: Path)
     held = tuple(name for name in effects if name not in lacking)
     fitted = fitted_in_file(with_effects(inference, held) if lacking else inference, section)
     found, _ = found_of(fitted, reflectors)
+    predicted_mm = 0.0
     if lacking:
+        predicted_mm = prediction_rms_mm(fitted.fit)
         found = replace(found, spread=_with_misfit(fitted, found.spread))
     if inference.posterior.probability_unexplained > OPTIONS.min_unexplained_probability:
         others.append("unexplained")
@@ -170,8 +175,8 @@ def corrected(inference: InferenceResult, section: dict[str, Any], folder: Path)
         compliance, play = (_of_acting_drives(numbers, *which, count) for which in (_COMPLIANCE, _BACKLASH))
         found = replace(found, compliance=compliance, play=play)
         text, lost = to_urdf(section["urdf"], found, folder, **chain)
-        return Corrected(text, (*others, *lost), tuple(lacking), found)
+        return Corrected(text, (*others, *lost), tuple(lacking), found, predicted_mm)
     text, lost = to_mjcf(section["mjcf"], section["platform"], found, folder)
     drives = ((*_COMPLIANCE, found.compliance), (*_BACKLASH, found.play))
     in_file = {name: {f"{stem}{k + 1}": value for k, (value, _) in each.items()} for name, stem, each in drives if each}
-    return Corrected(text, (*others, *lost), tuple(lacking), found, in_file, mjcf=True)
+    return Corrected(text, (*others, *lost), tuple(lacking), found, predicted_mm, in_file, mjcf=True)

@@ -25,7 +25,7 @@ from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.problem import DiagnosisProblem
 from rrru.diagnosis.result_notes import payload_notes
 from rrru.diagnosis.shrink import model_row
-from rrru.diagnosis.verdict_facts import NOT_CORRECTED, expected_mm
+from rrru.diagnosis.verdict_facts import NOT_CORRECTED
 from rrru.effects.library import active_effects
 from rrru.effects.protocol import Motion, together
 from rrru.errors import ConfigError, SimulationError, UnreachableError
@@ -64,9 +64,11 @@ def write_corrected(
         more, why = gap_rows(inference, written, section, file, shrink)
         _refuse_worse(more)
         error = file_error(inference, _model(inference, written, section, file), masses, stream(seed, "fresh poses"))
-        sizes = {"file_error_mm": error.measured_mm, "file_error_fresh_mm": error.fresh_mm}
-        expected = expected_mm(diagnosis.verdict | sizes)
-        worth = sizes | {
+        expected = _expected_mm(diagnosis, written, error)
+        worth = {
+            "file_error_mm": error.measured_mm,
+            "file_error_fresh_mm": error.fresh_mm,
+            "file_expected_mm": expected,
             "file_remainder": _remainder(shrink, more, written, inference, expected),
             "file_headline": _headline(written, error),
         }
@@ -79,6 +81,17 @@ def write_corrected(
     verdict = diagnosis.verdict | worth | {"notes": notes, "not_in_model": "; ".join(lost)}
     tables = {"gap_shrink": shrink, "corrected_drives": corrected_drives(inference, masses)}
     return replace(diagnosis, verdict=verdict, tables=diagnosis.tables | tables)
+
+
+def _expected_mm(diagnosis: Diagnosis, written: Corrected, error: "FileError") -> float:
+    """Error in mm to expect of a corrected file's robot at poses and loads like those measured.
+
+    Its distance from the diagnosed robot and the error of that one at held-out points are independent: squares add. The
+    numbers of a file that cannot hold an effect are fitted to the readings at which that distance is taken, so that
+    what their fit leaves at left-out stops is the better estimate where it is larger.
+    """
+    distance_mm = np.fmax(error.measured_mm, error.fresh_mm)
+    return max(float(np.hypot(distance_mm, diagnosis.verdict["gap_after_rms_mm"])), written.predicted_mm)
 
 
 def _left_mm(steps: pd.DataFrame, kind: str) -> float:
@@ -322,8 +335,8 @@ def _fresh_differences(
     """Vectors (n, 3) from the file's robot to the diagnosed one at fresh poses, NaN where one of them has none.
 
     The drive values are weighted means of those at three measured poses, so that they lie within the measured range.
-    Payload and time are those of one of the three, and each drive comes from either side: an effect makes the error
-    that it has in the campaign, and the backlashes of several drives add up as independent errors.
+    Payload, time and temperature are those of one of the three, and each drive comes from either side: an effect makes
+    the error that it has in the campaign, and the backlashes of several drives add up as independent errors.
     """
     problem = inference.problem
     robot, (actuators, command) = problem.mechanism, problem.driven
@@ -337,8 +350,9 @@ def _fresh_differences(
     closed = np.flatnonzero(poses.closed)
     drive, approach, like = drive[closed], approach[closed], picks[closed, 0]
     position = robot.measured(poses.of(closed), robot.twists())
-    conditions = (np.nan_to_num(values[like]) for values in (problem.motion.payload_kg, problem.motion.time_s))
-    motion = at_rest(robot, masses, (position, drive, *conditions), approach, drive)
+    payload, time_s = (np.nan_to_num(values[like]) for values in (problem.motion.payload_kg, problem.motion.time_s))
+    state = position, drive, payload, time_s, problem.motion.temperature_c[like]
+    motion = at_rest(robot, masses, state, approach, drive)
     readings = None if problem.readings is None else problem.readings.of(like)
     diagnosed, written = (
         robot.twists(inference.state.deviations) + effect_twists(inference, motion),

@@ -43,15 +43,15 @@ def corrected_drives(inference: InferenceResult, masses: Masses) -> pd.DataFrame
         within = (nominal >= low - _ROUNDING) & (nominal <= high + _ROUNDING)
         reached &= (within | (high - low <= _ROUNDING)).all(axis=1)
     position, turn, nominal = position[reached], turn[reached], nominal[reached]
-    payload, end_s = at_end(problem)
-    loads = {"payload_kg": payload, "time_s": end_s}
+    end = at_end(problem)
+    loads = dict(zip(("payload_kg", "time_s", "temperature_c"), end, strict=True))
     if not len(position):
         return _table(robot, (position, turn), (nominal, {0: nominal}), loads)
     found = {}
     for approach in (-1, 1):
         corrected = nominal
         for _ in range(OPTIONS.correction_iterations):
-            motion = at_rest(robot, masses, (position, corrected, payload, end_s), approach, nominal)
+            motion = at_rest(robot, masses, (position, corrected, *end), approach, nominal)
             twists = robot.twists(inference.state.deviations) + effect_twists(inference, motion)
             corrected = inverse_kinematics(robot, (position, turn), (nominal, position), twists)
         found[approach] = corrected
@@ -78,7 +78,9 @@ def _table(
         for side, values in found.items()
     ]
     table = pd.concat(frames, ignore_index=True)
-    return table[np.isfinite(table.to_numpy(dtype=float)).all(axis=1)].reset_index(drop=True)
+    # no temperature is known where the file has none
+    known = table.drop(columns="temperature_c").to_numpy(dtype=float)
+    return table[np.isfinite(known).all(axis=1)].reset_index(drop=True)
 
 
 def _grid(commands: FloatArray) -> tuple[FloatArray, IntArray]:
@@ -94,26 +96,28 @@ def _grid(commands: FloatArray) -> tuple[FloatArray, IntArray]:
     return points[far <= OPTIONS.max_grid_distance_steps], number[far <= OPTIONS.max_grid_distance_steps]
 
 
-def at_end(problem: DiagnosisProblem) -> tuple[float, float]:
-    """The largest payload in kg and the time in s of the end of a problem's campaign."""
-    payload_kg = float(np.nan_to_num(problem.motion.payload_kg[problem.used]).max(initial=0.0))
-    return payload_kg, float(np.nanmax(problem.motion.time_s, initial=0.0))
+def at_end(problem: DiagnosisProblem) -> tuple[float, float, float]:
+    """The largest payload in kg, time in s of a campaign's end, and its last temperature in degrees C, NaN for none."""
+    motion = problem.motion
+    payload_kg = float(np.nan_to_num(motion.payload_kg[problem.used]).max(initial=0.0))
+    known = motion.temperature_c[np.isfinite(motion.temperature_c)]
+    return payload_kg, float(np.nanmax(motion.time_s, initial=0.0)), float(known[-1]) if len(known) else np.nan
 
 
 def at_rest(
     robot: Robot,
     masses: Masses,
-    state: tuple[FloatArray, FloatArray, float | FloatArray, float | FloatArray],
+    state: tuple[FloatArray, FloatArray, float | FloatArray, float | FloatArray, float | FloatArray],
     approach: float | FloatArray,
     nominal: FloatArray,
 ) -> Motion:
     """The Motion at rest at positions (n, 3) and drives (n, K), each of which came from one side.
 
-    state: positions in mm, drives, payload in kg and time in s, one number or (n,); approach: 1 from smaller values, -1
-    from larger ones, one number or (n, K); nominal (n, K): drive values that bring the nominal robot there, which is
-    where it stands.
+    state: positions in mm, drives, and payload in kg, time in s and temperature in degrees C (NaN if unknown), one
+    number or (n,); approach: 1 from smaller values, -1 from larger ones, one number or (n, K); nominal (n, K): drive
+    values that bring the nominal robot there, which is where it stands.
     """
-    position, drive, payload, time_s = state
+    position, drive, payload, time_s, temperature_c = state
     count, nothing = len(position), np.zeros_like(position)
     course = Course(
         position_mm=position,
@@ -124,6 +128,7 @@ def at_rest(
         velocity_mm_s=nothing,
         acceleration_mm_s2=nothing,
         payload_kg=np.full(count, payload),
+        temperature_c=temperature_c,
         drive_motion=(np.zeros_like(drive), np.zeros_like(drive)),
         # from further away than any backlash, and any travel over which friction builds up
         approach=approach,

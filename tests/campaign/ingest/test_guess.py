@@ -69,3 +69,9 @@ def test_a_count_from_zero_is_no_number_of_points(value, found):
 @pytest.mark.parametrize("name", ["Load kg", "load_kg", "Load [kg]", "payload"])
 def test_a_unit_behind_a_space_is_a_unit(name):
     assert _guessed(name) == {"payload_kg": name}
+
+
+@pytest.mark.parametrize("name", ["Ziel", "Reflektor", "Target", "Marke"])
+def test_names_of_reflectors_are_proposed_as_targets(name):
+    """A column "Ziel" was left out, so that the tool was taken to be what was read."""
+    assert _guessed(name, value="smr") == {"target": name}

@@ -162,7 +162,7 @@ def test_a_directory(tmp_path):
     assert_problem(problems_of(None, tmp_path), None, None, "a directory", "a file of measurements")
 
 
-NO_NUMBER = "a finite number"
+NO_NUMBER = "a finite number; drop a row that lacks one"
 CELLS = {
     "text": ("measured_x_mm", "NA", NO_NUMBER),
     "text in time": ("time_s", "soon", NO_NUMBER),

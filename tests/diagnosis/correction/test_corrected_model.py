@@ -171,7 +171,7 @@ def test_corrected_drives_bring_the_measured_robot_to_where_it_is_commanded(name
         for approach, own in table.groupby("approach"):
             drives, place = own[[prefix + column for column in robot.parts.columns]].to_numpy(), rows.command(own)
             nominal = own[[*robot.parts.columns]].to_numpy()
-            motion = at_rest(robot, _MASSES, (place, drives, 0.0, 0.0), approach, nominal)
+            motion = at_rest(robot, _MASSES, (place, drives, 0.0, 0.0, np.nan), approach, nominal)
             twists = robot.twists_of(campaign.errors) + together(active_effects(campaign.effects, robot), motion).twists
             lengths.append(np.linalg.norm(robot.measured(robot.solve(drives, place, twists), twists) - place, axis=1))
         off[prefix] = np.sqrt(np.mean(np.concatenate(lengths) ** 2))
@@ -340,7 +340,8 @@ def test_the_stated_error_of_a_corrected_file_is_that_from_the_true_robot(name, 
     picks, share = generator.integers(len(measured), size=(200, 2)), generator.random((200, 1))
     drive, near = (share * one[picks[:, 0]] + (1.0 - share) * one[picks[:, 1]] for one in (measured, command))
     place = robot.forward(drive, guess_mm=near)
-    motion = at_rest(robot, _MASSES, (place, drive, 0.0, 0.0), generator.choice([-1.0, 1.0], drive.shape), drive)
+    approach = generator.choice([-1.0, 1.0], drive.shape)
+    motion = at_rest(robot, _MASSES, (place, drive, 0.0, 0.0, np.nan), approach, drive)
     twists = robot.twists_of(campaign.errors) + together(active_effects(campaign.effects, robot), motion).twists
     true = robot.measured(robot.solve(drive, place, twists), twists)
     key = "mjcf" if "mjcf" in section else "urdf"

@@ -59,7 +59,25 @@ def test_a_drive_that_comes_from_one_side_has_wound_up_however_long_its_travel_i
     position = robot.forward(drive)
     effect = find("friction_windup", robot)
     for approach in (1, -1, np.random.default_rng(7).choice([-1.0, 1.0], drive.shape)):
-        motion = at_rest(robot, arms.MASSES, (position, drive, 0.0, 0.0), approach, drive)
+        motion = at_rest(robot, arms.MASSES, (position, drive, 0.0, 0.0, np.nan), approach, drive)
         found = effect.contribute(motion, [*amplitude, 0.8])
         expected = motion.at_drives(np.broadcast_to(-approach * amplitude, drive.shape))
         np.testing.assert_allclose(found.twists, expected.twists, atol=1e-15)
+
+
+def test_drive_values_are_those_of_the_robot_as_warm_as_at_the_last_point():
+    """A robot whose links grow has its flange at (1 + a (T - 20)) times the place; the table was that of 20 degrees."""
+    expansion, warm_c = 3e-5, 34.0
+    frame = arms.measure(count=40).assign(temperature_c=np.linspace(22.0, warm_c, 40))
+    effect = find("thermal_expansion", arms.ARM)
+    robot = as_measured(replace(arms.ARM, parameter_set="full"), frame)
+    problem = make_diagnosis_problem(frame, robot, arms.MASSES, 1.0, {effect.name: effect}, False, 500.0)
+    nothing = np.zeros_like(calibrate(problem).deviations)
+    state = ModelState(nothing, {(effect.name, 0): np.array([expansion])})
+    table = corrected_drives(SimpleNamespace(problem=problem, state=state), arms.MASSES)
+    assert len(table) > 10 and (table["temperature_c"] == warm_c).all()
+    drive = table[[f"corrected_{name}" for name in NAMES]].to_numpy()
+    flange = replace(arms.ARM, tool_mm=(0.0, 0.0, 0.0)).forward(drive)
+    reached = arms.ARM.forward(drive) + expansion * (warm_c - 20.0) * flange
+    off = np.linalg.norm(reached - table[["command_x_mm", "command_y_mm", "command_z_mm"]], axis=1)
+    assert off.max() < 1e-3

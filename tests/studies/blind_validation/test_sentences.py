@@ -113,6 +113,7 @@ _CASES = [
     ("it is random error", {"share": "0"}, {}),
     ("what is left with it", {"value": "0.011"}, {"value": "0.05"}),
     ("that it shrinks cannot be seen", ({}, {"before_mm": 0.02}, _FACTS), {}),
+    ("it does not shrink", ({}, {"after_mm": 0.5}, _FACTS), {}),
     ("next, a run", {"run": "stops in reverse"}, {"run": "line_9 once more"}),
     ("next, none is advised", ({}, _UNKNOWN, _OUTSIDE), ({}, {}, _OUTSIDE)),
     (

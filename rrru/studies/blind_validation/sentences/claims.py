@@ -62,7 +62,8 @@ _SENTENCES = {
     r"together, .*",
     "shares overlap": r"These shares add up to more than the gap.*",
     "something is unexplained": rf"(?:Another|It is systematic, and no effect .*:) "
-    rf"(?:(?P<share>{_NUMBER}) %|(?:an )?undetermined share) .*",
+    rf"(?:(?P<share>{_NUMBER}) %|(?:an )?undetermined share) .*"
+    r"|It is systematic, and no effect of the library explains it at left-out points\.",
     "no cause is sure": r"No cause is probable enough to be named; .*",
     "more acts": r"More acts than the named causes, .*",
     "the unexplained follows": r"The unexplained part follows .*",
@@ -81,6 +82,7 @@ _SENTENCES = {
     "what is left with it": rf"With {_MODEL} in the simulator the residual error at left-out points is {_X} mm; "
     rf"the {_NOISE}\.",
     "that it shrinks cannot be seen": r"That it shrinks cannot be seen at these points: .*",
+    "it does not shrink": r"At these points it is no smaller than without .*: another cause may act\.",
     "these data cannot rule out": r"(?:These data cannot rule out|Parts of the unexplained share could be): "
     r"(?P<names>.*)\.",
     "next, a run": r"Next: (?:drive|measure) (?P<run>.*)\. That (?:decides|would help to decide) "

@@ -407,6 +407,7 @@ _JUDGES = {
     "it is random error": _scatter,
     "what is left with it": lambda stated, t, _: _sized(stated["value"], t.after_mm, t, t.rows, t.after_error_mm2),
     "that it shrinks cannot be seen": lambda _, t, __: t.before_mm < t.noise_rms_mm,
+    "it does not shrink": lambda _, t, facts: t.after_mm >= t.before_mm or not _verdict_right(facts, t),
     "next, a run": _next_run,
     "next, none is advised": _unexplained,
     "next, nothing more": lambda _, t, facts: _verdict_right(facts, t),
