@@ -14,7 +14,7 @@ from rrru.diagnosis.budget import budget
 from rrru.diagnosis.design.advise import Advice, advise
 from rrru.diagnosis.design.run_limits import StatedLimits
 from rrru.diagnosis.determined import few_readings, require_determined
-from rrru.diagnosis.discrepancy_basis import JUMPS, lone_jump
+from rrru.diagnosis.discrepancy_basis import JUMPS, UNKNOWN, lone_jump
 from rrru.diagnosis.discrepancy_bias import discrepancy_covariance
 from rrru.diagnosis.drive_functions import drive_functions
 from rrru.diagnosis.inference import (
@@ -285,7 +285,8 @@ def _decide(
     worse than the verdict without it, by more than chance, is ruled out, and the others are decided again. Where
     something is unexplained an effect may be a part of that: it has to predict them better, and to make more than a
     small part of the gap, to be named. One that is too small for a name stays in the model where it predicts left-out
-    points better. Both are asked with the one jump that acts; the model that is given has none.
+    points better. Both are asked with the one jump that acts; the model that is given has none. Where an answer's
+    predictions are further off than those of the calibration alone, its worst effect is ruled out.
     """
     ruled_out: set[str] = set()
     small: frozenset[str] = frozenset()
@@ -298,7 +299,7 @@ def _decide(
         jump = lone_jump(inference.hypothesis.effects) if verdict.unexplained else ()
         fitted = with_effects(inference, (*names, *jump))
         least = OPTIONS.max_heldout_loss_nats if verdict.unexplained else -OPTIONS.max_heldout_loss_nats
-        worse = {name for name, gain in _gains(fitted).items() if gain < least}
+        worse = {name for name, gain in _gains(fitted).items() if gain < least} or _misleading(fitted)
         if not worse:
             ordered = tuple(one for one in order_by_share(fitted) if one[0].effect not in JUMPS)
             shares = {term.effect: share for term, share in ordered}
@@ -360,6 +361,15 @@ def _without_effects(inference: InferenceResult, prior: Prior) -> InferenceResul
     """The inference of the calibration alone, with a posterior that has no effect of the library."""
     names = set(inference.problem.effects)
     return with_effects(inference.with_posterior(_without(inference, names, names, prior)), ())
+
+
+def _misleading(inference: InferenceResult) -> set[str]:
+    """The effect that is ruled out where predictions with those of the hypothesis are further off than without any."""
+    terms, level = inference.hypothesis.terms, inference.level
+    if not inference.hypothesis.effects.isdisjoint(UNKNOWN):
+        return set()
+    worst = inference.held_out.misleading(terms, inference.hypothesis.prior_scales[level], level)
+    return {worst.effect} if worst else set()
 
 
 def _gains(inference: InferenceResult) -> dict[str, float]:

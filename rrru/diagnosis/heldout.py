@@ -265,6 +265,35 @@ class HeldOut:
             result.append(float(score - _log_score(residual, variance).sum()))
         return result
 
+    def misleading(
+        self, terms: Sequence[EffectTerm], prior_scales: Sequence[float] | FloatArray, level: int
+    ) -> EffectTerm | None:
+        """The term without which predictions are nearest, where they are further off than by the calibration alone.
+
+        That is so where their mean square is larger, and more stops are further off than by chance: by more than two
+        standard deviations of a fair coin (sign test; a few stops far off would hide it from a test of means). A rough
+        function can follow the readings themselves where something else leaves more than the noise. It knows how
+        uncertain it is between them, so that the log score does not tell. None where it is not so.
+        """
+        part = self.on_complete(terms)
+        if part is not self:
+            return part.misleading(terms, prior_scales, level)
+        if not terms:
+            return None
+        _, stop = np.unique(self.problem.stop, return_inverse=True)
+
+        def squares_mm2(some: Sequence[int]) -> FloatArray:
+            chosen, scales = [terms[k] for k in some], [prior_scales[k] for k in some]
+            residual = self.predict(chosen, scales, level, uncertain=False).residual_mm
+            return np.bincount(stop, (residual**2).sum(axis=1)) / np.bincount(stop)
+
+        further = squares_mm2(range(len(terms))) - squares_mm2(())
+        excess = np.sign(further).sum() / np.sqrt(len(further))
+        if not (further.mean() > 0.0 and excess > OPTIONS.max_further_off):
+            return None
+        without = [[k for k in range(len(terms)) if k != out] for out in range(len(terms))]
+        return terms[int(np.argmin([squares_mm2(some).mean() for some in without]))]
+
     def on_complete(self, terms: Sequence[EffectTerm]) -> "HeldOut":
         """The predictions of the readings at which all effects of terms have what they need."""
         evidence = self.evidence.on_complete(terms)

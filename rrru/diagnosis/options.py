@@ -132,6 +132,9 @@ class DiagnosisOptions:
     negligible_nats: float = 25.0
     # an effect that predicts left-out points worse by more is ruled out; with something unexplained it has to gain it
     max_heldout_loss_nats: float = 3.0
+    # an answer with which more stops are predicted worse than by chance, by so many standard deviations, is none; the
+    # usual 5 %
+    max_further_off: float = 2.0
     # no cause is named while "none" is more probable: a false alarm costs more than a small gap that is not found
     max_none_probability: float = 0.2
     # rivals less probable than this share of the verdict's probability are not named; the usual 5 %

@@ -18,8 +18,9 @@ from rrru.diagnosis import shrink
 from rrru.diagnosis.calibrate import calibrate
 from rrru.diagnosis.heldout import HeldOut, Prediction, resampled_groups, resampled_quantiles, resampled_rows
 from rrru.diagnosis.inference import with_noise
-from rrru.diagnosis.terms import EffectTerm
+from rrru.diagnosis.terms import EffectTerm, signatures
 from rrru.diagnosis.whitened import DISCREPANCY_SCALES
+from rrru.effects.library import find
 from rrru.errors import ConfigError
 from rrru.estimation.observations.target_positions import TargetPositions
 from rrru.studies.real import length_tables
@@ -98,6 +99,36 @@ def test_predictions_equal_a_refit_without_the_fold(passes, level):
     residual, uncertain = _refitted(held_out, level, smooth=passes is FULL)
     np.testing.assert_allclose(found.residual_mm, residual, atol=2e-6)
     np.testing.assert_allclose(found.uncertainty_mm2, uncertain, rtol=1e-4)
+
+
+def test_a_function_that_follows_random_errors_is_misleading_and_an_effect_that_acts_is_not(full):
+    """Errors of ten times the noise, next to which a wide function of a drive passes through the readings."""
+    assert full.misleading(TERMS, PRIOR_SCALES, 0) is None
+    frame = measure(plan=plan_of((FORWARD,)))
+    wild = rows.measured(frame) + np.random.default_rng(2).normal(0.0, 10.0 * NOISE_MM, (len(frame), 3))
+    frame = frame.assign(**rows.vector_columns("measured", wild))
+    names = ("servo_lag", "drive_error_function")
+    problem = problem_of(frame, {name: find(name, MODEL) for name in names})
+    held_out = HeldOut(problem, problem.evidence(problem.linearise(calibrate(problem))))
+    terms, scales = (EffectTerm("servo_lag", 0, 2), EffectTerm("drive_error_function", 0, 1)), [1.0, 30.0]
+    assert held_out.misleading(terms, scales, 0) == terms[1]
+    assert held_out.misleading(terms[:1], scales[:1], 0) is None and held_out.misleading((), [], 0) is None
+    # by least squares of the other folds
+    linear, squares = held_out.evidence.linear, {}
+    for name, used in (("alone", ()), ("both", terms)):
+        columns = np.concatenate([linear.base, *signatures(problem.library, linear, used)], axis=-1) / problem.noise_mm
+        prior = np.zeros(columns.shape[-1])
+        prior[linear.base.shape[-1] :] = 1.0 / held_out.evidence.scales(used, scales[: len(used)])
+        left = []
+        for number in np.unique(held_out.fold):
+            out = held_out.fold == number
+            design = np.concatenate([columns[~out].reshape(-1, len(prior)), np.diag(prior)])
+            data = np.concatenate([linear.data[~out].ravel() / problem.noise_mm, np.zeros(len(prior))])
+            unit = np.linalg.norm(design, axis=0)
+            found = np.linalg.lstsq(design / unit, data, rcond=None)[0] / unit
+            left.append(linear.data[out] - problem.noise_mm * columns[out] @ found)
+        squares[name] = (np.concatenate(left) ** 2).mean()
+    assert squares["both"] > 1.1 * squares["alone"]
 
 
 @pytest.mark.parametrize("level", [0, 3])
