@@ -38,8 +38,8 @@ _POSE += (*(f"command_r{axis}_rad" for axis in "xyz"), "speed_mm_s", "payload_kg
 _AGAIN = "once more"
 # needs of effects that the speed of a pass does not change
 _ALIKE_AT_ANY_SPEED = {PATH, "drive", "position_mm", "payload_kg", "temperature_c"}
-# kinds of further passes: in reverse, fast, loaded
-_KINDS = ((False, False, False), (True, False, False), (False, True, False), (False, False, True), (True, True, True))
+# kinds of further passes, the simplest first: in reverse, fast, loaded
+_KINDS = ((False, False, False), (True, False, False), (False, False, True), (False, True, False), (True, True, True))
 
 
 @dataclass(frozen=True)
