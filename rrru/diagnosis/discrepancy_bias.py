@@ -22,7 +22,16 @@ from scipy.special import logsumexp
 from rrru.arrays import FloatArray
 from rrru.diagnosis.model_fit import ModelFit, whitening_of
 from rrru.diagnosis.options import OPTIONS
-from rrru.diagnosis.smooth_functions import OF_DRIVES, OF_RATES, OF_ZEROS, Regression, Variable, process, variables
+from rrru.diagnosis.smooth_functions import (
+    OF_DRIVES,
+    OF_RATES,
+    OF_ZEROS,
+    Regression,
+    Variable,
+    couplings,
+    process,
+    variables,
+)
 from rrru.diagnosis.state import RANK_TOLERANCE
 from rrru.estimation.estimate import Estimate
 from rrru.estimation.noise_model import Whitening
@@ -136,7 +145,8 @@ def _designs(fit: ModelFit) -> Iterator[FloatArray]:
     """What functions of each kind of variable make of the readings (m, 3, k), for unit size and each length scale."""
     problem = fit.model.problem
     drive = problem.of_rows(problem.map_of(fit.state).drive_effect)
-    found = variables(problem, fit.state, drive, np.ones(len(problem), dtype=bool))
+    rows = np.ones(len(problem), dtype=bool)
+    found = variables(problem, fit.state, drive, rows)
     # of positions on the robot alone; errors of drives turn the platform as well
     mask = problem.on_robot[:, None, None]
     for kind, group in groupby(found, key=lambda one: one.kind or one.follows):
@@ -154,6 +164,8 @@ def _designs(fit: ModelFit) -> Iterator[FloatArray]:
         time = _over_range(zeros[0])
         for of_value, of_time in product(OPTIONS.bias_scales[-2:], OPTIONS.bias_scales):
             yield _together(drives, [np.column_stack([_over_range(one) / of_value, time / of_time]) for one in drives])
+    for coupling, scale in product(couplings(problem, drive, rows), OPTIONS.bias_scales):
+        yield _together([coupling], [_over_range(coupling) / scale])
 
 
 def _together(some: list[Variable], places: list[FloatArray]) -> FloatArray:

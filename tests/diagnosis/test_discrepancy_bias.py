@@ -25,13 +25,18 @@ def _fit(problem):
     return fit_model(problem, [calibrate(problem)])
 
 
-@pytest.fixture(scope="module")
-def fitted():
-    """A campaign of the 3-RRRU, its readings with noise alone, and the fit to them."""
-    campaign = virtual_campaign("rrru3", "white", 0.5)
+def _fitted(name):
+    """Campaign, readings and fit of a robot."""
+    campaign = virtual_campaign(name, "white", 0.5)
     truth = draw_truth(campaign, np.random.default_rng(1), acts=False)
     frame = measure(campaign, replace(truth, deviations=0.2 * truth.deviations), np.random.default_rng(2))
     return campaign, frame, _fit(_problem(campaign, frame))
+
+
+@pytest.fixture(scope="module")
+def fitted():
+    """A campaign of the 3-RRRU, its readings with noise alone, and the fit to them."""
+    return _fitted("rrru3")
 
 
 def test_it_is_the_variance_given_what_the_parameters_can_change_of_the_readings(fitted):
@@ -86,6 +91,30 @@ def test_errors_of_drives_that_are_functions_of_their_values_are_covered(fitted,
     z = bias / np.sqrt(np.diag(covariance))
     assert np.sqrt((z**2).mean()) < 2.0
     # without it they are off by many of their standard errors
+    assert np.sqrt(((bias / found.estimate.standard_errors) ** 2).mean()) > 5.0
+
+
+@pytest.fixture(scope="module")
+def arm():
+    """The same of an arm."""
+    return _fitted("arm7")
+
+
+@pytest.mark.parametrize("drives", [(3, 4), (2, 3), (4, 5)])
+def test_an_error_of_a_drive_in_proportion_to_another_one_is_covered(arm, drives):
+    """As where two drives are coupled: its part in each parameter is known from refits."""
+    campaign, frame, fit = arm
+    problem, (driving, driven) = fit.model.problem, drives
+    drive = problem.motion.drive[problem.at]
+    response = problem.of_rows(problem.map_of(fit.state).drive_effect)[..., driven]
+    moved_mm = np.zeros((len(frame), 3))
+    moved_mm[problem.used] = 1e-3 * response * (drive[:, [driving]] - drive[:, driving].mean())
+    wrong = frame.assign(**rows.vector_columns("measured", rows.measured(frame) + moved_mm))
+    found = _fit(_problem(campaign, wrong))
+    bias = found.estimate.values - fit.estimate.values
+    z = bias / np.sqrt(np.diag(discrepancy_covariance(found)))
+    # no other error but one of the size that is found acts
+    assert np.abs(z).max() < 1.5
     assert np.sqrt(((bias / found.estimate.standard_errors) ** 2).mean()) > 5.0
 
 
