@@ -337,11 +337,24 @@ class _Pair:
         return gains
 
 
-@pytest.mark.parametrize(("added", "share"), [(0.15, 0.025), (-0.15, 0.025), (7.0, 1.0), (-7.0, 1.0)])
-def test_a_run_that_did_not_decide_is_not_advised_again(added, share, monkeypatch):
-    """Run 3 drives line_1 again; it was expected to add 6 nats: nothing alike is expected of another such run."""
-    frame = pd.DataFrame({"run": np.repeat([1, 2, 3], 10), "trajectory": np.repeat(["line_1", "line_2", "line_1"], 10)})
-    inference = SimpleNamespace(problem=SimpleNamespace(measurements=frame, used=np.ones(30, dtype=bool)))
+# of 6 nats expected one run is off by sqrt(12) nats, of 30 nats five runs by sqrt(60)
+@pytest.mark.parametrize(
+    ("added", "share"),
+    [
+        ([0.15], (0.15 + np.sqrt(12.0)) / 6.0),
+        ([-0.15], (0.15 + np.sqrt(12.0)) / 6.0),
+        ([7.0], 1.0),
+        ([-7.0], 1.0),
+        ([0.5, -0.5, 0.1, -0.1, 0.0], np.sqrt(60.0) / 30.0),
+        ([6.0, 6.0, 6.0, 6.0, 0.0], 1.0),
+    ],
+)
+def test_runs_that_did_not_decide_are_expected_to_add_less(added, share, monkeypatch):
+    """Runs along line_1 once more were each expected to add 6 nats."""
+    again = range(3, 3 + len(added))
+    names = ["line_1", "line_2", *["line_1"] * len(added)]
+    frame = pd.DataFrame({"run": np.repeat([1, 2, *again], 10), "trajectory": np.repeat(names, 10)})
+    inference = SimpleNamespace(problem=SimpleNamespace(measurements=frame, used=np.ones(len(frame), dtype=bool)))
     rows = [
         ("line_1 once more", 6.0, 6.0),
         ("line_1 with 5 kg payload", 9.0, 6.0),
@@ -360,9 +373,11 @@ def test_a_run_that_did_not_decide_is_not_advised_again(added, share, monkeypatc
             for name, gain, plain in rows
         ]
 
-    monkeypatch.setattr(advise_module, "realized_log_bayes_factors", lambda *_: {1: 0.0, 2: 0.0, 3: added})
+    found = {1: 0.0, 2: 0.0} | dict(zip(again, added, strict=True))
+    monkeypatch.setattr(advise_module, "realized_log_bayes_factors", lambda *_: found)
     known = advise_module.realized_share(inference, listed(1.0))
+    assert known == pytest.approx(share)
     left = [float(one.as_realized(known).gains[0]) for one in listed(1.0)]
     np.testing.assert_allclose(left, [6.0 * share, 3.0 + 6.0 * share, 5.0 * share, 8.0 * share])
-    # of a run that was expected to add little nothing follows
-    assert advise_module.realized_share(inference, listed(0.1)) == 1.0
+    # of runs that were expected to add little nothing follows
+    assert advise_module.realized_share(inference, listed(0.08)) == 1.0

@@ -2,9 +2,9 @@
 
 Candidates are further passes along a campaign's own trajectories. Where none of them would resolve most of the doubt
 between all probable answers, poses are chosen too, each the one that adds most to those before it. What they add is
-counted as `rrru.diagnosis.design.expected_information` says. Where a trajectory was driven again before, and that was
-expected to decide, the readings show which share f of the expected gain was realized. What needs no other payload or
-speed is then worth f times as much. No candidate exceeds the limits of the robot, see
+counted as `rrru.diagnosis.design.expected_information` says. Where trajectories were driven again before, and that was
+expected to decide, the readings show which share f of the expected gain may have been realized. What needs no other
+payload or speed is then worth f times as much. No candidate exceeds the limits of the robot, see
 `rrru.diagnosis.design.run_limits`.
 """
 
@@ -145,25 +145,25 @@ def _is_again(run: Row) -> bool:
 
 
 def realized_share(inference: InferenceResult, found: Sequence[Candidate]) -> float:
-    """Share of the expected gain that the last run along a trajectory driven before has added, at most 1.
+    """Share of the expected gain that runs along trajectories driven before may have added, at most 1.
 
-    1 where it was not expected to decide.
+    1 where they were not expected to decide. A log Bayes factor expected to be E has the variance 2 E: the share is the
+    largest that is within one standard deviation of what the readings of all these runs added.
     """
     about = found[0].contests
     again = {one.run["trajectory"]: one for one in found if _is_again(one.run)}
     frame = inference.problem.measurements[inference.problem.used]
-    driven = frame.groupby("run", sort=False)["trajectory"].first().astype(str)
+    by_run = frame.groupby("run", sort=False)["trajectory"]
+    driven = by_run.first().astype(str)
     repeated = driven[driven.duplicated() & driven.isin(again)]
-    if repeated.empty:
-        return 1.0
-    run, last = repeated.index[-1], again[repeated.iloc[-1]]
-    expected = last.gain_of_first * float((frame["run"] == run).sum()) / last.run["points"]
+    shares = by_run.size()[repeated.index] / [again[name].run["points"] for name in repeated]
+    expected = float(shares @ [again[name].gain_of_first for name in repeated]) if len(repeated) else 0.0
     if not expected > OPTIONS.decisive_gain_nats:
         return 1.0
     # evidence for either answer counts
-    answers = [one.answer for one in about.pairs[about.first]]
-    realized = abs(realized_log_bayes_factors(inference, answers).get(run, np.inf))
-    return float(min(realized / expected, 1.0))
+    factors = realized_log_bayes_factors(inference, [one.answer for one in about.pairs[about.first]])
+    realized = abs(sum(factors.get(run, np.inf) for run in repeated.index))
+    return float(min((realized + np.sqrt(2.0 * expected)) / expected, 1.0))
 
 
 def _planned(problem: DiagnosisProblem, table: pd.DataFrame, masses: Masses) -> DiagnosisProblem:

@@ -57,9 +57,7 @@ class Prediction:
         precision (k,): prior precision of the coefficients.
         """
         design, data = present
-        gram = design.T @ design + np.diag(precision)
-        unit = 1.0 / np.sqrt(np.maximum(np.diag(gram), 1e-300))
-        root = np.linalg.cholesky(unit[:, None] * gram * unit + 1e-12 * np.eye(len(unit)))
+        unit, root = _factor(design, precision)
         moment = solve_triangular(root, unit[:, None] * (design.T @ data), lower=True)
         planned = [_condensed(*one) for one in planned]
         shape = len(planned), max(len(one) for one, _ in planned)
@@ -277,11 +275,17 @@ def realized_log_bayes_factors(inference: InferenceResult, answers: Sequence[Ans
 def _negative_log_evidence(design: FloatArray, data: FloatArray, precision: FloatArray) -> float:
     """Minus the log marginal likelihood, up to a constant, of a design (n, 3, k) and data (n, 3) over the noise."""
     flat, target = design.reshape(-1, len(precision)), data.ravel()
-    gram = flat.T @ flat + np.diag(precision)
+    unit, root = _factor(flat, precision)
+    moment = solve_triangular(root, unit * (flat.T @ target), lower=True)
+    misfit = 0.5 * float(target @ target - moment @ moment)
+    return misfit + float(np.log(np.diag(root)).sum() - np.log(unit).sum())
+
+
+def _factor(design: FloatArray, precision: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Units u (k,) and lower factor L (k, k) of normal equations, u (X^T X + P) u = L L^T; X: design, P: precision."""
+    gram = design.T @ design + np.diag(precision)
     unit = 1.0 / np.sqrt(np.maximum(np.diag(gram), 1e-300))
-    scaled, moment = unit[:, None] * gram * unit + 1e-12 * np.eye(len(unit)), unit * (flat.T @ target)
-    misfit = 0.5 * float(target @ target - moment @ np.linalg.solve(scaled, moment))
-    return misfit + 0.5 * float(np.linalg.slogdet(scaled)[1] - 2.0 * np.log(unit).sum())
+    return unit, np.asarray(np.linalg.cholesky(unit[:, None] * gram * unit + 1e-12 * np.eye(len(unit))), dtype=float)
 
 
 def without_unreachable(problem: DiagnosisProblem, state: ModelState) -> DiagnosisProblem:

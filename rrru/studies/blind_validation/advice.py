@@ -146,7 +146,7 @@ def _verdict_columns(when, found, robot):
 def random_runs(arm, points, generator):
     """Random candidate runs of the advice that have together at least so many points, and one at least.
 
-    None where the verdict of the Arm is settled.
+    Empty where the verdict of the Arm is settled.
     """
     chosen, choice = [], [] if arm.is_sure else candidates(arm.measurements)[0]
     while choice and sum(run["points"] for run in chosen) < max(points, 1):
