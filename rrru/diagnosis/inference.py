@@ -540,9 +540,15 @@ def _with_hidden_offsets(inference: InferenceResult, prior: Prior, stated_mm: fl
     other, source = with_noise(problem, inference.evidence.linear, stated_mm, follow_means=False)
     if source == REPEATS or other.noise is None or not other.noise.offset_probability > OPTIONS.min_offset_probability:
         return inference
+    least = inference.log_likelihood + 0.5 * np.log(3.0 * series)
+    evidence = other.evidence(inference.evidence.linear)
+    space = ModelSpace(evidence.on_library(), prior)
+    climbed = space.posterior([space.climb(inference.hypothesis.terms)])
+    # a search about another state is worth its time where the same columns show a chance
+    if replace(inference, evidence=evidence, posterior=climbed).log_likelihood < least - OPTIONS.max_climb_below_nats:
+        return inference
     found = replace(_rounds(other, inference.calibrated, prior, KNOWN), noise_from=source)
-    cost = 0.5 * np.log(3.0 * series)
-    return found if found.log_likelihood - cost > inference.log_likelihood else inference
+    return found if found.log_likelihood > least else inference
 
 
 def _about_another_mode(inference: InferenceResult, prior: Prior, effects: Collection[str]) -> InferenceResult:
@@ -561,8 +567,11 @@ def _about_another_mode(inference: InferenceResult, prior: Prior, effects: Colle
     except FitError:
         return inference
     space = ModelSpace(evidence.on_library(), prior)
-    posterior = space.confirmed(space.climb(other.hypothesis.terms))
-    if posterior.height <= inference.posterior.height:
+    first = space.climb(other.hypothesis.terms)
+    # a whole search is worth its time only where a climb from either answer ends higher
+    climbs = [first, space.climb(inference.hypothesis.terms)]
+    if space.posterior(climbs).height <= inference.posterior.height:
         return inference
+    posterior = space.confirmed(first)
     found = replace(other, problem=problem, evidence=evidence).with_posterior(posterior)
     return with_effects(found, found.hypothesis.effects)

@@ -88,6 +88,8 @@ class DiagnosisOptions:
     window_nats: float = 6.0
     # a set so far below the best at one level is tried at no other: e^-15 is 3e-7
     hopeless_nats: float = 15.0
+    # a noise whose evidence by a climb alone is so far too low is not searched in full: that has added 0.3 nats
+    max_climb_below_nats: float = 3.0
     # a set of a smaller share of the probability has no neighbours that matter; assumed
     min_expanded_probability: float = 0.01
     # a note says so where probabilities by searches from different starts differ by more; assumed

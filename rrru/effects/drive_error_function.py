@@ -32,6 +32,7 @@ from collections.abc import Callable
 import numpy as np
 
 from rrru.arrays import FloatArray
+from rrru.cache import Latest, read_only
 from rrru.effects.harmonic import waves
 from rrru.effects.protocol import Contribution, Coordinates, Effect, Motion
 from rrru.kinematics.robot import Robot
@@ -83,10 +84,17 @@ def for_robot(robot: Robot) -> Effect:
         broad=True,
     )
 
+    # a fit evaluates the same motion again and again
+    latest = Latest(1)
+
     def functions(motion: Motion) -> list[FloatArray]:
         """By drive the functions (n, 1 + 2 orders) of its value that a unit of each of its coordinates adds."""
-        constant = np.ones((len(motion), 1))
-        return [np.concatenate([constant, waves(angle, ORDERS)], axis=1) for angle in (motion.drive * per_unit).T]
+        found: list[FloatArray] = latest.of(motion.drive.tobytes(), lambda: read_only(made(motion.drive)))
+        return found
+
+    def made(drive: FloatArray) -> list[FloatArray]:
+        constant = np.ones((len(drive), 1))
+        return [np.concatenate([constant, waves(angle, ORDERS)], axis=1) for angle in (drive * per_unit).T]
 
     def err(motion: Motion, values: FloatArray) -> Contribution:
         """Changes of the actuator values under coefficients (K times (1 + 2 orders),) in their units."""
