@@ -61,7 +61,7 @@ def start(folder, *targets, overlays=(MINIMAL,), cores=2, record=None):
 def run(folder, *targets, **options):
     """Exit code and output of snakemake in a folder, see `start`."""
     process = start(folder, *targets, **options)
-    output, _ = process.communicate(timeout=900)
+    output, _ = process.communicate(timeout=3600)
     return process.returncode, output
 
 
