@@ -26,8 +26,8 @@ from rrru.kinematics.point_masses import PointMass
 # keys of a row: of a joint, of a fixed frame
 JOINT = ("a", "alpha", "d", "theta", "sliding", "name", "drives", "mass_kg", "com_mm")
 FRAME = ("xyz_mm", "rpy_rad", "mass_kg", "com_mm")
-# sites that every arm has
-_TAKEN = (WORLD, TOOL, "base", "flange")
+# names of the sites that every arm has
+_RESERVED_SITES = (WORLD, TOOL, "base", "flange")
 
 
 def serial(
@@ -49,13 +49,14 @@ def serial(
     Raises ConfigError for an unknown key or drive.
     """
     links = _links(rows, modified, name)
+    _require_unique(links, name)
     coupling = _coupling([link for link in links if link.name], name)
-    joints, point_masses, driven = [Joint("base")], [], 0
+    joints, point_masses, drive_number = [Joint("base")], [], 0
     shift, turn = np.zeros(3), np.eye(3)
     for link in links:
         seat = Joint(link.site, link.kind, Z, shift + turn @ link.shift_mm, turn @ link.turn)
-        joints.append(replace(seat, drive=driven) if link.name else seat)
-        driven += bool(link.name)
+        joints.append(replace(seat, drive=drive_number) if link.name else seat)
+        drive_number += bool(link.name)
         shift, turn = link.after
         if link.mass_kg:
             point_masses.append(PointMass(link.site, link.mass_kg, shift + turn @ np.asarray(link.com_mm)))
@@ -111,29 +112,36 @@ def _links(rows: Sequence[Mapping[str, Any]], modified: bool, robot: str) -> lis
         allowed = FRAME if "xyz_mm" in row or "rpy_rad" in row else JOINT
         if unknown := set(row) - set(allowed):
             raise ConfigError(f"{robot}: row {number} has {unknown.pop()!r}; allowed: {', '.join(allowed)}")
-        body = {key: row[key] for key in ("mass_kg", "com_mm") if key in row}
+        mass = {key: row[key] for key in ("mass_kg", "com_mm") if key in row}
         if allowed is FRAME:
             turn = Rotation.from_euler("xyz", row.get("rpy_rad", (0.0, 0.0, 0.0))).as_matrix()
-            shift, none = np.asarray(row.get("xyz_mm", (0.0, 0.0, 0.0)), dtype=float), (np.zeros(3), np.eye(3))
-            result.append(_Link(f"frame {number}", "", "fixed", shift, turn, none, {}, **body))
+            shift, identity = np.asarray(row.get("xyz_mm", (0.0, 0.0, 0.0)), dtype=float), (np.zeros(3), np.eye(3))
+            result.append(_Link(f"frame {number}", "", "fixed", shift, turn, identity, {}, **mass))
             continue
-        along, across, twist = row.get("d", 0.0) * Z, row.get("a", 0.0) * X, turn_about(X, row.get("alpha", 0.0))
-        offset, name = turn_about(Z, row.get("theta", 0.0)), row.get("name", f"q{number}")
-        places = (np.zeros(3), offset, (along + across, twist))
+        link_offset, joint_turn = row.get("d", 0.0) * Z, turn_about(Z, row.get("theta", 0.0))
+        link_length, link_twist = row.get("a", 0.0) * X, turn_about(X, row.get("alpha", 0.0))
+        places = (np.zeros(3), joint_turn, (link_offset + link_length, link_twist))
         if modified:
-            places = across, twist @ offset, (along, np.eye(3))
+            places = link_length, link_twist @ joint_turn, (link_offset, np.eye(3))
+        name = row.get("name", f"q{number}")
         kind = "P" if row.get("sliding") else "R"
         site = row.get("name", f"joint {number}")
-        result.append(_Link(site, name, kind, *places, dict(row.get("drives", {name: 1.0})), **body))
+        result.append(_Link(site, name, kind, *places, dict(row.get("drives", {name: 1.0})), **mass))
     return result
+
+
+def _require_unique(links: Sequence[_Link], robot: str) -> None:
+    """Raise ConfigError where two joints, or two sites, have one name."""
+    joints = [*_RESERVED_SITES, *(link.name for link in links if link.name)]
+    sites = [*_RESERVED_SITES, *(link.site for link in links)]
+    for names in (joints, sites):
+        if len(set(names)) < len(names):
+            duplicate = max(names, key=names.count)
+            raise ConfigError(f"{robot}: two joints or frames are called {duplicate!r}; allowed: names of their own")
 
 
 def _coupling(joints: Sequence[_Link], robot: str) -> dict[str, FloatArray]:
     """Columns (D,) of the coupling by drive, in the order of the joints that have a drive of their own."""
-    names = [*_TAKEN, *(link.name for link in joints)]
-    if len(set(names)) < len(names):
-        most = max(names, key=names.count)
-        raise ConfigError(f"{robot}: two joints or frames are called {most!r}; allowed: names of their own")
     drives = [link.name for link in joints if link.name in link.drives]
     if not drives:
         raise ConfigError(f"{robot}: no row has a drive of its own; allowed: one or more")
@@ -152,7 +160,7 @@ def _parts(joints: Sequence[_Link], coupling: Mapping[str, FloatArray]) -> Parts
     result = []
     for drive, column in coupling.items():
         driven = next(link for link in joints if link.name == drive)
-        twists = {link.site: by * link.twist for link, by in zip(joints, column, strict=True) if by}
+        twists = {link.site: factor * link.twist for link, factor in zip(joints, column, strict=True) if factor}
         result.append(Drive(f"{drive}_{driven.unit}", driven.unit, driven.site, twists.pop(driven.site), twists))
     followers = [Drive(f"{j.name}_{j.unit}", j.unit, j.site, j.twist) for j in joints if j.name not in j.drives]
     return Parts(drives=tuple(result), followers=tuple(followers))

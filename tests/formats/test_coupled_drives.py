@@ -210,6 +210,9 @@ _JOINT = {"a": 100.0}
         ([_JOINT, _JOINT | {"drives": {"q1": 0.0}}], "joint q2 follows q1 times 0.0; allowed: not 0"),
         ([_JOINT, _JOINT | {"name": "q1"}], "two joints or frames are called 'q1'"),
         ([_JOINT, _JOINT | {"name": "flange"}], "two joints or frames are called 'flange'"),
+        # places that rows without a name get
+        ([_JOINT, _JOINT | {"name": "joint 1"}], "two joints or frames are called 'joint 1'"),
+        ([{"xyz_mm": [0.0, 0.0, 1.0]}, _JOINT | {"name": "frame 1"}], "two joints or frames are called 'frame 1'"),
         ([{"xyz_mm": [0.0, 0.0, 1.0]}], "no row has a drive of its own"),
         ([_JOINT, _JOINT | {"gear": 3}], "row 2 has 'gear'; allowed: a, alpha"),
         ([_JOINT, {"xyz_mm": [0, 0, 1], "a": 3}], "row 2 has 'a'; allowed: xyz_mm"),
