@@ -48,11 +48,11 @@ _NOISE_MM = 0.02
 # a rival is listed from this share of the visible mean square on, so many at most
 _MIN_CONFOUNDED_SHARE, _MAX_RIVALS = 0.5, 4
 _WARMING_K = 2.0
-_RANK = 1e-9
+_RANK_TOLERANCE = 1e-9
 _WIDTH, _TITLE_HEIGHT, _HALF_HEIGHT = 680, 18, 40
 _PANEL_HEIGHT = _TITLE_HEIGHT + 2 * _HALF_HEIGHT + 8
 _COLOURS = ("#1f77b4", "#ff7f0e", "#2ca02c")
-_SEARCHED = "Its coefficients are those of the orders that stand out in a campaign's data."
+_SEARCHED_ORDERS_TEXT = "Its coefficients are those of the orders that stand out in a campaign's data."
 
 # what a file must hold for an effect to be tested, by the field of Motion that its model needs
 NEEDS = {
@@ -159,7 +159,7 @@ SCENES = (
     ),
 )
 # pictures and confounding are of the first robots; of the others only where none of the first can have the effect
-_SHOWN = 2
+_SHOWN_SCENES = 2
 
 _HEAD = """# Catalogue of effects
 
@@ -188,7 +188,7 @@ in motion, the arm (`data/models/arm6.urdf`) once more at rest for the effects t
 
 def markdown():
     """The page."""
-    shown = SCENES[:_SHOWN]
+    shown = SCENES[:_SHOWN_SCENES]
     head = _HEAD.format(
         count=len(NAMES),
         share=_MIN_CONFOUNDED_SHARE,
@@ -214,7 +214,7 @@ def confounded(scene, name):
     None where the scene's campaign does not test the effect or the calibration absorbs it.
     """
     visible = scene.visible()
-    if name not in visible or not _seen(scene, name):
+    if name not in visible or not _is_visible(scene, name):
         return None
     columns = visible[name][0]
     shares = {
@@ -227,21 +227,21 @@ def confounded(scene, name):
 
 @cache
 def _basis(scene, name):
-    """Orthonormal basis of what the calibration does not absorb of an effect."""
+    """Orthonormal basis of the part of an effect that the calibration does not absorb."""
     basis, size, _ = np.linalg.svd(scene.visible()[name][0], full_matrices=False)
-    return basis[:, size > _RANK * size.max(initial=1e-300)]
+    return basis[:, size > _RANK_TOLERANCE * size.max(initial=1e-300)]
 
 
-def _seen(scene, name):
-    """Whether the calibration leaves anything of an effect but rounding."""
+def _is_visible(scene, name):
+    """Whether the calibration leaves more of an effect than rounding."""
     left, raw = scene.visible()[name]
     return raw.size > 0 and float(np.linalg.norm(left)) > OPTIONS.min_visible_rms_share * float(np.linalg.norm(raw))
 
 
 def _scenes(name):
-    """Scenes whose pictures are shown of an effect."""
-    able = [scene for scene in SCENES if name in scene.visible() and _seen(scene, name)]
-    return [scene for scene in able if scene in SCENES[:_SHOWN]] or able[:1]
+    """Scenes on which an effect is shown."""
+    able = [scene for scene in SCENES if name in scene.visible() and _is_visible(scene, name)]
+    return [scene for scene in able if scene in SCENES[:_SHOWN_SCENES]] or able[:1]
 
 
 def _module(name):
@@ -286,7 +286,7 @@ def _section(name):
     if scenes:
         parts.append(f"![signature of {name} on {titles}](effects/{name}.svg)\n")
     else:
-        parts += [f"**On the {scene.title}:** {_rivals(scene, name)}.\n" for scene in SCENES[:_SHOWN]]
+        parts += [f"**On the {scene.title}:** {_rivals(scene, name)}.\n" for scene in SCENES[:_SHOWN_SCENES]]
     return "\n".join(parts)
 
 
@@ -308,7 +308,7 @@ def _sizes(name):
     """Table of an effect's parameters, those of all legs or drives in one row."""
     effect = _made(name)
     if not len(effect.coordinates):
-        return f"{_SEARCHED}\n"
+        return f"{_SEARCHED_ORDERS_TEXT}\n"
     coordinates = effect.coordinates
     free = [p.name for p in effect.parameters if p.name not in coordinates.shapes[0]]
     values = effect.parameters.mapping(coordinates.to_values(coordinates.typical, coordinates.shapes[0]))

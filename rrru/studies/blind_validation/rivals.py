@@ -29,18 +29,18 @@ from rrru.diagnosis.terms import EACH, signatures, variants
 from rrru.seeds import stream
 from rrru.studies.blind_validation.verdicts import NONE, UNEXPLAINED, in_order
 
-_RESAMPLED, _FOLDS = 50, 5
-# Gibbs sweeps over all effects, the first of which are dropped; probability that an effect acts; standard deviations of
-# its coefficients on columns of unit length, in units of the noise
-_SWEEPS, _DROPPED, _ACTS = 1500, 300, 0.1
+_RESAMPLINGS, _FOLDS = 50, 5
+# Gibbs sweeps over all effects, number of first ones that are dropped; prior probability that an effect acts; prior
+# standard deviations of its coefficients on columns of unit length, in units of the noise
+_SWEEPS, _DROPPED, _PRIOR_PROBABILITY = 1500, 300, 0.1
 _SLABS = np.geomspace(3.0, 1000.0, 6)
 # relative singular value below which a column of a set does not count
-_RANK = 1e-5
+_RANK_TOLERANCE = 1e-5
 # a column with a smaller fraction after projection onto the complement of the calibration is not visible
-_LEAST_VISIBLE = 1e-6
-# number of points for the hyperparameters of the Gaussian process
-_LEARNED_FROM = 250
-_NAMED = ("time_s", "speed_mm_s", "payload_kg")
+_MIN_VISIBLE_SHARE = 1e-6
+# the hyperparameters of the Gaussian process are fitted to every k-th point: to this number of points, up to twice it
+_HYPERPARAMETER_POINTS = 250
+_SCALAR_INPUTS = ("time_s", "speed_mm_s", "payload_kg")
 
 
 @dataclass(frozen=True)
@@ -77,12 +77,12 @@ def _unit(columns, base):
     basis, _ = np.linalg.qr(base)
     left, whole = columns - basis @ (basis.T @ columns), np.linalg.norm(columns, axis=0)
     size = np.linalg.norm(left, axis=0)
-    seen = size > _LEAST_VISIBLE * whole
+    seen = size > _MIN_VISIBLE_SHARE * whole
     return np.where(seen, left / np.where(seen, size, 1.0), 0.0)
 
 
-def _uncalibrated(campaign):
-    """The data (3n,) of a campaign without what the calibration absorbs."""
+def _projected_data(campaign):
+    """The data (3n,) of a campaign, projected onto the complement of the calibration's columns."""
     basis, _ = np.linalg.qr(campaign.base)
     return campaign.data - basis @ (basis.T @ campaign.data)
 
@@ -93,7 +93,7 @@ class _Reduced:
     """
 
     def __init__(self, campaign):
-        self.data = _uncalibrated(campaign)
+        self.data = _projected_data(campaign)
         unit = _unit(np.concatenate(list(campaign.columns.values()), axis=1), campaign.base)
         self.gram, self.moment = unit.T @ unit, unit.T @ self.data
         ends = np.cumsum([columns.shape[1] for columns in campaign.columns.values()])
@@ -116,7 +116,7 @@ def bayes_information(campaign):
 def _explained(gram, moment):
     """Reduction of the sum of squares by columns, from their Gram matrix (k, k) and moments (k,), and their rank."""
     size, turned = np.linalg.eigh(gram)
-    used = size > _RANK**2 * max(size[-1], 1e-300)
+    used = size > _RANK_TOLERANCE**2 * max(size[-1], 1e-300)
     return float(((turned[:, used].T @ moment) ** 2 / size[used]).sum()), int(used.sum())
 
 
@@ -129,7 +129,7 @@ def lasso(campaign, generator):
     owner = np.repeat([term.effect for term in chosen], [columns.shape[1] for columns in chosen.values()])
     columns, points = np.concatenate(list(chosen.values()), axis=1), len(campaign.data) // 3
     found = Counter()
-    for _ in range(_RESAMPLED):
+    for _ in range(_RESAMPLINGS):
         drawn = (3 * generator.integers(points, size=points)[:, None] + np.arange(3)).ravel()
         base = campaign.base[drawn]
         data = campaign.data[drawn] - base @ np.linalg.lstsq(base, campaign.data[drawn], rcond=None)[0]
@@ -139,7 +139,7 @@ def lasso(campaign, generator):
             warnings.simplefilter("ignore", ConvergenceWarning)
             model.fit(_unit(columns[drawn], base), data)
         found[_label(owner[model.coef_ != 0.0].tolist())] += 1
-    return {effects: count / _RESAMPLED for effects, count in found.items()}
+    return {effects: count / _RESAMPLINGS for effects, count in found.items()}
 
 
 def spike_and_slab(campaign, generator):
@@ -152,7 +152,7 @@ def spike_and_slab(campaign, generator):
 
     @cache
     def marginal(*chosen):
-        """Most states of the sampler recur."""
+        """`_marginal`, cached: most states of the sampler recur."""
         return _marginal(reduced, chosen)
 
     for number, term in enumerate(campaign.columns):
@@ -163,20 +163,20 @@ def spike_and_slab(campaign, generator):
             others = [term for name, term in state.items() if name != effect]
             slab = state[effect][1] if effect in state else generator.choice(_SLABS)
             log = [marginal(*others, (number, slab)) for number in terms_of_effect]
-            log_without = marginal(*others) + np.log(len(terms_of_effect) * (1.0 / _ACTS - 1.0))
+            log_without = marginal(*others) + np.log(len(terms_of_effect) * (1.0 / _PRIOR_PROBABILITY - 1.0))
             log = np.array([log_without, *log])
-            chosen = _drawn(log, generator)
+            chosen = _drawn_index(log, generator)
             state.pop(effect, None)
             if chosen:
                 term = terms_of_effect[chosen - 1]
                 log = [marginal(*others, (term, slab)) for slab in _SLABS]
-                state[effect] = term, _SLABS[_drawn(np.array(log), generator)]
+                state[effect] = term, _SLABS[_drawn_index(np.array(log), generator)]
         if sweep >= _DROPPED:
             found[_label(state)] += 1
     return {effects: count / (_SWEEPS - _DROPPED) for effects, count in found.items()}
 
 
-def _drawn(log, generator):
+def _drawn_index(log, generator):
     """A random index with the logarithms (n,) of its weights."""
     weights = np.exp(log - log.max())
     return int(generator.choice(len(weights), p=weights / weights.sum()))
@@ -202,11 +202,13 @@ def gaussian_process(campaign):
     from sklearn.gaussian_process.kernels import RBF, ConstantKernel
     from sklearn.model_selection import GroupKFold
 
-    points, left = campaign.problem.points, _uncalibrated(campaign).reshape(-1, 3)
-    seen = np.column_stack([rows.command(points), rows.direction(points), points[list(_NAMED)].to_numpy(dtype=float)])
+    points, left = campaign.problem.points, _projected_data(campaign).reshape(-1, 3)
+    seen = np.column_stack(
+        [rows.command(points), rows.direction(points), points[list(_SCALAR_INPUTS)].to_numpy(dtype=float)]
+    )
     seen = seen[:, np.ptp(seen, axis=0) > 0.0]
     seen = (seen - seen.mean(axis=0)) / seen.std(axis=0)
-    few = slice(None, None, max(len(seen) // _LEARNED_FROM, 1))
+    few = slice(None, None, max(len(seen) // _HYPERPARAMETER_POINTS, 1))
     kernel = ConstantKernel(1.0, (1e-3, 1e5)) * RBF(np.ones(seen.shape[1]), (1e-1, 1e3))
     with warnings.catch_warnings():
         # a length scale at its bound is valid: that input does not matter

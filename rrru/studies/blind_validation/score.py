@@ -3,7 +3,7 @@
 And the upper limit of what a campaign's data can show about the cause of its gap, with the true effect model known.
 Detection is a likelihood-ratio test: the calibration alone against the calibration with the columns of the true causes.
 Shapes, legs and noise are known, sizes are free. Confounding is measured by the chi-square that the best wrong
-explanation leaves of the noise-free gap.
+explanation does not reproduce of the noise-free gap.
 """
 
 from dataclasses import asdict, dataclass, replace
@@ -24,11 +24,11 @@ from rrru.studies.blind_validation.robots import Conditions, noise_free, robot_o
 from rrru.studies.blind_validation.stated import held, state_of
 from rrru.studies.blind_validation.verdicts import PLANTS, SEVERAL_CAUSES, is_right, scores
 
-_LIMITS = ["oracle_chi2", "oracle_freedom", "oracle_detects", "rival", "rival_chi2", "confounded_share"]
+_LIMIT_COLUMNS = ["oracle_chi2", "oracle_freedom", "oracle_detects", "rival", "rival_chi2", "confounded_share"]
 # limits are computed for the checks with one or two causes and the stated noise
-_LIMITED = ("label", "effect", *PLANTS)
-_FALSE_ALARMS = 0.01
-_TRUE = "true:"
+_CHECKS_WITH_LIMITS = ("label", "effect", *PLANTS)
+_FALSE_ALARM_PROBABILITY = 0.01
+_TRUE_PREFIX = "true:"
 _MAX_RIVALS = 3
 
 
@@ -69,7 +69,7 @@ def score_chunk(answers, measurements, verdicts, stated, states, budget, known):
         if len(statements):
             causes.append(causes_of(statements, robot).assign(check=row["check"]))
     robots = robots.assign(**pd.DataFrame(measured, index=robots.index))
-    limited = robots.loc[robots["check"].isin(_LIMITED), ["check", "robot", "weakest", *_LIMITS]]
+    limited = robots.loc[robots["check"].isin(_CHECKS_WITH_LIMITS), ["check", "robot", "weakest", *_LIMIT_COLUMNS]]
     # measurements that allow no test of an effect have no statement
     stated_causes = pd.concat(causes or [empty_causes()], ignore_index=True)
     return Scored(scores(robots), limited, pd.concat(listed, ignore_index=True), stated_causes)
@@ -100,7 +100,7 @@ def _measured(row, robot, points, about, taken_out):
 
 def _limits(row, robot, points, about, calibrated, taken_out):
     """The Limits of a robot."""
-    if row["check"] not in _LIMITED:
+    if row["check"] not in _CHECKS_WITH_LIMITS:
         return Limits()
     if robot.file:
         return of_displacement(robot.oracle_chi2)
@@ -166,12 +166,12 @@ def of_displacement(gain):
     """Limits of data whose chi-square drops by a gain when the true displacement is fitted, its size free."""
     from scipy.stats import chi2
 
-    return Limits(gain, 1, bool(gain > chi2.ppf(1.0 - _FALSE_ALARMS, 1)))
+    return Limits(gain, 1, bool(gain > chi2.ppf(1.0 - _FALSE_ALARM_PROBABILITY, 1)))
 
 
 def with_truth(library, acting):
     """A library by name together with the acting causes in their true shapes."""
-    return library | {f"{_TRUE}{one.effect}": one.effect_model for one in acting}
+    return library | {f"{_TRUE_PREFIX}{one.effect}": one.effect_model for one in acting}
 
 
 def limits(problem, deviations, acting, names):
@@ -181,14 +181,14 @@ def limits(problem, deviations, acting, names):
     """
     from scipy.stats import chi2
 
-    causes = {(f"{_TRUE}{cause.effect}", 0): cause for cause in acting}
+    causes = {(f"{_TRUE_PREFIX}{cause.effect}", 0): cause for cause in acting}
     if not causes or any(name not in problem.library for name, _ in causes):
         return Limits()
     known = [name for name in names if name in problem.library]
     rivals = [(name, shape) for name in known for shape in range(len(problem.library[name].coordinates.shapes))]
     reduced = _Reduced(problem, deviations, [*causes, *rivals])
     true = np.concatenate([reduced.columns[key][:, _free(cause)] for key, cause in causes.items()], axis=1)
-    gain = float((reduced.data**2).sum() - _left(true, reduced.data))
+    gain = float((reduced.data**2).sum() - _residual_square(true, reduced.data))
     freedom = int(np.linalg.matrix_rank(true))
     signal = sum(reduced.columns[key] @ np.array(cause.coordinates) for key, cause in causes.items())
     truth = frozenset(one.effect for one in acting)
@@ -196,7 +196,7 @@ def limits(problem, deviations, acting, names):
     most = len(causes) if truth <= set(names) else _MAX_RIVALS
     rival, left = reduced.rival(signal, truth, rivals, most)
     share = 1.0 - float(np.sqrt(left / (signal**2).sum()))
-    return Limits(gain, freedom, bool(gain > chi2.ppf(1.0 - _FALSE_ALARMS, freedom)), rival, left, share)
+    return Limits(gain, freedom, bool(gain > chi2.ppf(1.0 - _FALSE_ALARM_PROBABILITY, freedom)), rival, left, share)
 
 
 def _free(cause):
@@ -205,8 +205,8 @@ def _free(cause):
     return legs == cause.leg if cause.leg else np.ones(len(legs), dtype=bool)
 
 
-def _left(columns, target):
-    """Sum of squares that columns (n, k) leave of a target (n,)."""
+def _residual_square(columns, target):
+    """Residual sum of squares of a target (n,) after a least-squares fit of columns (n, k)."""
     fitted, *_ = np.linalg.lstsq(columns, target, rcond=1e-10)
     return float(((target - columns @ fitted) ** 2).sum())
 
@@ -234,16 +234,16 @@ class _Reduced:
                 names = frozenset(name for name, _ in keys)
                 if len(names) < size or names == truth:
                     continue
-                left = self._left_by(keys, signal)
+                left = self._residual_square_of(keys, signal)
                 if left < best[1]:
                     best = ("+".join(sorted(names)), left)
         return best
 
-    def _left_by(self, keys, signal):
-        """Sum of squares that a set leaves of a signal, with bounds at zero for positive coordinates."""
+    def _residual_square_of(self, keys, signal):
+        """Residual sum of squares of a signal (k,) after the fit of a set, positive coordinates bounded at zero."""
         columns = np.concatenate([self.columns[key] for key in keys], axis=1)
         positive = np.concatenate([self._library[name].coordinates.positive for name, _ in keys])
-        left = _left(columns, signal)
+        left = _residual_square(columns, signal)
         if not positive.any():
             return left
         from scipy.optimize import lsq_linear

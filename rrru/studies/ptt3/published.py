@@ -14,7 +14,7 @@ from rrru.studies.paper import read_numbers
 
 NUMBERS = sum(read_numbers(Path(__file__).with_name("numbers.csv")).values(), ())
 # relative excess of the cross-validated error over its minimum at which a network has converged
-_CONVERGED = 0.1
+_MAX_EXCESS_ERROR = 0.1
 
 
 def published_rows(section, benefit, spread, training, repeatability):
@@ -70,6 +70,6 @@ def _networks(curve, chosen, training, order):
     for _, part in curves:
         error = np.sqrt(part["validation_mse_mm2"].to_numpy())
         # the fewest neurons with an error near the minimum
-        steps.append(part["neurons"].to_numpy()[np.argmax(error <= (1.0 + _CONVERGED) * error.min())])
+        steps.append(part["neurons"].to_numpy()[np.argmax(error <= (1.0 + _MAX_EXCESS_ERROR) * error.min())])
     spreads = {f"spread_{order[row.experiment]}": row.spread_mm / half_mm for row in chosen.itertuples()}
     return spreads | {"training_steps": float(np.median(steps))}

@@ -63,14 +63,14 @@ class Step:
         }
 
 
-def held_out(left_mm: np.ndarray) -> dict[str, float]:
+def held_out(residual_mm: np.ndarray) -> dict[str, float]:
     """Mean, rms and largest held-out residual by column of the tables, NaN where no row is held out."""
-    mean, largest = (float(left_mm.mean()), float(left_mm.max())) if len(left_mm) else (np.nan, np.nan)
-    return {"held_out_mean_mm": mean, "held_out_rms_mm": rms(left_mm), "held_out_max_mm": largest}
+    mean, largest = (float(residual_mm.mean()), float(residual_mm.max())) if len(residual_mm) else (np.nan, np.nan)
+    return {"held_out_mean_mm": mean, "held_out_rms_mm": rms(residual_mm), "held_out_max_mm": largest}
 
 
 def rms(values: np.ndarray) -> float:
-    """Root mean square, NaN of nothing."""
+    """Root mean square, NaN where there are no values."""
     return float(np.sqrt((values**2).mean())) if len(values) else np.nan
 
 
@@ -106,7 +106,7 @@ def steps(problem: DiagnosisProblem) -> tuple[Step, ...]:
     none = ModelState(np.zeros(len(problem.mechanism.parameters)), {})
     state = fit_frames(problem, none)
     numbers = len(library[FRAMES].coordinates), _identified(problem, state, False), time.perf_counter() - began
-    result = [Step("a", "frames", state, *numbers, *_left(problem, state))]
+    result = [Step("a", "frames", state, *numbers, *_residuals(problem, state))]
     names: tuple[str, ...] = ()
     calibrated = calibrate(problem)
     for model, adds, effect in _MODELS:
@@ -122,7 +122,7 @@ def steps(problem: DiagnosisProblem) -> tuple[Step, ...]:
             names = names[:-1]
             continue
         numbers = len(fit.estimate.values), fit.estimate.rank, time.perf_counter() - began
-        result.append(Step(model, adds, fit.state, *numbers, *_left(problem, fit.state)))
+        result.append(Step(model, adds, fit.state, *numbers, *_residuals(problem, fit.state)))
     return tuple(result)
 
 
@@ -130,7 +130,7 @@ def verdict_step(problem: DiagnosisProblem, state: ModelState, seconds: float) -
     """The step of a diagnosis' state: calibration and named effects."""
     count = len(state.deviations) + sum(len(values) for values in state.effects.values())
     adds = "+".join(name for name, _ in state.effects) or "nothing"
-    return Step("verdict", adds, state, count, _identified(problem, state), seconds, *_left(problem, state))
+    return Step("verdict", adds, state, count, _identified(problem, state), seconds, *_residuals(problem, state))
 
 
 def _identified(problem: DiagnosisProblem, state: ModelState, calibrated: bool = True) -> int:
@@ -140,7 +140,7 @@ def _identified(problem: DiagnosisProblem, state: ModelState, calibrated: bool =
     return numerical_rank(np.concatenate(blocks, axis=-1).reshape(linear.data.size, -1))
 
 
-def _left(problem: DiagnosisProblem, state: ModelState) -> tuple[np.ndarray, np.ndarray]:
+def _residuals(problem: DiagnosisProblem, state: ModelState) -> tuple[np.ndarray, np.ndarray]:
     """`trained_mm` and `held_out_mm` of a state."""
     return trained_mm(problem, state), held_out_mm(problem, state)
 
@@ -148,10 +148,10 @@ def _left(problem: DiagnosisProblem, state: ModelState) -> tuple[np.ndarray, np.
 def _extra_effects(problem: DiagnosisProblem) -> dict[str, Effect]:
     """Effects that only these models have, where a robot has sites for them."""
     result, robot = {FRAMES: frames(problem.mechanism)}, problem.mechanism
-    sharp = find("transmission_orders", robot)
-    if sharp is not None:
+    waves = find("transmission_orders", robot)
+    if waves is not None:
         pairs = tuple((drive, float(order)) for drive in range(len(robot.parts.drives)) for order in (1, 2))
-        result[_HARMONICS] = replace(sharp.with_waves(pairs), name=_HARMONICS)
+        result[_HARMONICS] = replace(waves.with_waves(pairs), name=_HARMONICS)
     return result
 
 

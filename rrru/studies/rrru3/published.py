@@ -29,20 +29,21 @@ def published_rows(settings, errors, calibrations, parameters, genetic, genetic_
     )
     names = setup.mechanism(nominal).parameters.names
     parameters = pd.concat([parameters, typical_parameters(genetic, found, (*names, "dR", "dr"))], ignore_index=True)
+    values = parameters.set_index(["calibration", "method", "parameter"])["value"]
     runs = genetic[genetic["calibration"] == chosen["line_calibration"]]
-    numbers, order_notes = _error_numbers(errors, parameters, chosen)
+    numbers, order_notes = _error_numbers(errors, values, chosen)
     swept, swept_spread = _sweep(sweep_runs, settings["genetic"]["operators"])
     here = {
         **_design(nominal, virtual, settings["genetic"]),
         **swept,
-        **_fitted(parameters, chosen),
+        **_fitted(values, chosen),
         **numbers,
         "lines_objective": _objective(calibrations, runs, chosen),
     }
     counts = redraw_counts[redraw_counts["kind"] != "count"].set_index("item")
     spread = {row.Index: (row.median, row.low, row.high) for row in counts[counts["kind"] == "number"].itertuples()}
     spread |= swept_spread
-    notes = _notes(runs, parameters, chosen) | order_notes
+    notes = _notes(runs, values, chosen) | order_notes
     for row in counts.itertuples():
         text = f"{'holds' if row.kind == 'order' else 'within 15 %'} in {row.met} of {row.draws} other draws"
         notes[row.Index] = "; ".join(filter(None, (notes.get(row.Index), text)))
@@ -50,7 +51,7 @@ def published_rows(settings, errors, calibrations, parameters, genetic, genetic_
 
 
 def _design(nominal, virtual, genetic):
-    """Dimensions, motion and counts as configured; where the campaign has them."""
+    """Configured dimensions, motion and counts, as far as the campaign has them."""
     shape = virtual["trajectories"] if virtual else {}
     result = {
         **{key: value for key, value in nominal["dimensions"].items() if key in _DIMENSIONS},
@@ -71,7 +72,7 @@ def _design(nominal, virtual, genetic):
 
 
 def _sweep(runs, operators):
-    """Objectives of a single population, run to the end, at every swept value that the paper has.
+    """Objectives of a single population after its last generation, at every swept value that the paper has.
 
     By item: those of the seed that is nearest to the printed curve, and (median, low, high) over all seeds.
     """
@@ -91,9 +92,8 @@ def _sweep(runs, operators):
     return here, spread
 
 
-def _fitted(parameters, chosen):
-    """The printed 14 deviations of both calibrations; dR and dr separately are from the median genetic run."""
-    values = parameters.set_index(["calibration", "method", "parameter"])["value"]
+def _fitted(values, chosen):
+    """The 14 deviations that the paper prints, of both calibrations; dR and dr are those of the median genetic run."""
     result = {}
     for label, calibration in (("lines", chosen["line_calibration"]), ("spiral", chosen["spiral_calibration"])):
         for name in (*TIED, "da"):
@@ -103,18 +103,18 @@ def _fitted(parameters, chosen):
     return result
 
 
-def _error_numbers(errors, parameters, chosen):
-    """The error numbers of the paper's section 3 and its orders, and notes on these.
+def _error_numbers(errors, values, chosen):
+    """The errors of the paper's section 3 and the orders between them, and notes on the orders.
 
     Empty for a campaign that was not driven again along the paper's trajectories.
     """
     names = (chosen["line_calibration"], chosen["spiral_calibration"])
-    again = errors[(errors["mode"] == "closed_loop") & (errors["method"] == chosen["method"])]
+    compensated = errors[(errors["mode"] == "closed_loop") & (errors["method"] == chosen["method"])]
     before, lines, spiral = (
         frame.sort_values(["run", "point"])
         for frame in (
             errors[errors["mode"] == "before"],
-            *(again[again["calibration"] == name] for name in names),
+            *(compensated[compensated["calibration"] == name] for name in names),
         )
     )
     if not len(before) == len(lines) == len(spiral) > 0 or not set(before["trajectory"]) >= computed.TRAJECTORIES:
@@ -122,15 +122,14 @@ def _error_numbers(errors, parameters, chosen):
     before_mm, lines_mm, spiral_mm = (vectors(frame, "error") for frame in (before, lines, spiral))
     trajectory = before["trajectory"]
     margins = computed.group_orders(trajectory, before_mm, lines_mm, spiral_mm)
-    margins |= computed.spike_orders(trajectory, before_mm, lines_mm) | _links(parameters, chosen)
+    margins |= computed.spike_orders(trajectory, before_mm, lines_mm) | _link_margin(values, chosen)
     orders = {f"order_{name}": float(margin > 0.0) for name, margin in margins.items()}
     notes = {f"order_{name}": f"margin here {100.0 * margin:.1f} %" for name, margin in margins.items()}
     return computed.study_numbers(trajectory, before_mm, lines_mm, spiral_mm) | orders, notes
 
 
-def _links(parameters, chosen):
+def _link_margin(values, chosen):
     """Margin of the link errors' order, from the estimates of both calibrations."""
-    values = parameters.set_index(["calibration", "method", "parameter"])["value"]
     names = (chosen["line_calibration"], chosen["spiral_calibration"])
     found = [[values.get((name, chosen["method"], link)) for link in computed.LINKS] for name in names]
     return {} if None in [*found[0], *found[1]] else computed.link_order(*found)
@@ -144,11 +143,10 @@ def _objective(calibrations, runs, chosen):
     return calibrations.loc[fitted, "mean_mm"].mean()
 
 
-def _notes(runs, parameters, chosen):
+def _notes(runs, values, chosen):
     """Notes on the genetic algorithm's runs of the line calibration."""
     if runs.empty:
         return {}
-    values = parameters.set_index(["calibration", "method", "parameter"])["value"]
     difference = values[chosen["line_calibration"], "genetic", "da"]
     typical = f"here the genetic algorithm's median run, whose dr - dR is {difference:.4f} mm"
     reached = f"{runs['objective_mm'].min():.4f} to {runs['objective_mm'].max():.4f} mm"

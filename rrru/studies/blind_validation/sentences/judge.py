@@ -1,9 +1,9 @@
 """Whether a Claim is true: a function for every kind, from the Truth to True, False, or None where that is undecided.
 
-A size without an interval is true within 25 % of the true value, plus three standard errors of the noise and the
-rounding to two printed digits. The true value is one of a sample of fresh stops: what it contradicts by less than three
-of its own standard errors is undecided. A number with a standard error is true within three standard errors. A 95 %
-interval is true where it contains the true number. Lengths mm, angles rad.
+A size without an interval is true if its square differs from the true one by at most 55 % (the size by -33 % to +24 %)
+and three standard errors of the noise. The true size is that of a sample of fresh stops: a claim that it contradicts by
+less than three of its own standard errors is undecided. A number with a standard error is true within three standard
+errors. A 95 % interval is true where it contains the true number. Lengths mm, angles rad.
 """
 
 import re
@@ -14,27 +14,27 @@ from rrru.diagnosis.verdict import POSSIBLE
 from rrru.estimation.intervals import QUANTILE_95
 from rrru.studies.blind_validation.sentences.claims import PATTERNS, UNKNOWN
 
-# tolerance of the mean square of a size, and of a share; number of standard errors
-_NEAR, _NEAR_SHARE, _ERRORS = 0.55, 0.2, 3.0
+# relative tolerance of the square of a size; tolerance of a share; number of standard errors
+_SQUARE_TOLERANCE, _SHARE_TOLERANCE, _STANDARD_ERRORS = 0.55, 0.2, 3.0
 # chi-square below which a cause is not detectable, and above which it is always detectable
-_HIDDEN, _SEEN = 10.0, 60.0
+_UNDETECTABLE_CHI2, _DETECTABLE_CHI2 = 10.0, 60.0
 # least gap over noise of a cause that has to be named
 STRONG = 1.5
-_SURE = 0.9
+_MIN_SURE_PROBABILITY = 0.9
 # largest error of a corrected file relative to that of the estimate; relative tolerance of a stated rms
-_AS_GOOD, _REMAINDER = 1.1, 0.1
+_MAX_FILE_ERROR_RATIO, _RMS_TOLERANCE = 1.1, 0.1
 # relative tolerance of a noise, tolerance of measured angles; largest error of a place over its stated precision
-_NEAR_NOISE, _NEAR_TURN_RAD, _MOST_ERRORS = 0.15, 0.03, 3.0
+_NOISE_TOLERANCE, _ANGLE_TOLERANCE_RAD, _MAX_PLACE_ERRORS = 0.15, 0.03, 3.0
 # least error about the stated worst place, over the largest local error
-_WORST = 0.5
+_MIN_WORST_RATIO = 0.5
 # apparent zero offsets from errors of the links
-_OF_LINKS = {"rad": 1e-3, "mm": 0.5}
+_LINK_TOLERANCE = {"rad": 1e-3, "mm": 0.5}
 # rounding of shares that are printed to whole per cents
-_PRINTED = 0.005
+_PRINTED_ROUNDING = 0.005
 # residual over noise, without a cause, from which a robot has errors outside every model
-_OWN = 0.3
+_MIN_OUTSIDE_PER_NOISE = 0.3
 # least share of a file's rows that are not outliers
-_MOST_LEFT = 0.95
+_MIN_INLIER_SHARE = 0.95
 _NEIGHBOURS = 10
 
 
@@ -58,8 +58,8 @@ def _sized(said, true, truth, count, error_mm2=0.0):
     spread = truth.noise_rms_mm**2 * np.sqrt(2.0 / (3.0 * count)) + 2.0 * truth.noise_rms_mm * true / np.sqrt(
         3.0 * count
     )
-    off = abs(float(said) ** 2 - true**2) - _ERRORS * spread - _NEAR * true**2
-    return True if off <= 0.0 else None if off <= _ERRORS * error_mm2 else False
+    off = abs(float(said) ** 2 - true**2) - _STANDARD_ERRORS * spread - _SQUARE_TOLERANCE * true**2
+    return True if off <= 0.0 else None if off <= _STANDARD_ERRORS * error_mm2 else False
 
 
 def _verdict_right(facts, truth):
@@ -72,9 +72,9 @@ def _verdict_right(facts, truth):
 
 def _none(_stated, truth, _facts):
     """No systematic error is detectable in the data."""
-    if not truth.acts or truth.chi2 < _HIDDEN:
+    if not truth.acts or truth.chi2 < _UNDETECTABLE_CHI2:
         return True
-    return False if truth.chi2 > _SEEN else None
+    return False if truth.chi2 > _DETECTABLE_CHI2 else None
 
 
 def _verdict(_stated, truth, facts):
@@ -116,7 +116,7 @@ def _more(_stated, truth, facts):
 
 def _probability_of_cause(stated, truth, _facts):
     """A cause with a probability of 0.9 or more acts; a smaller probability is undecided."""
-    sure = stated["probability"].startswith("more") or float(stated["probability"].split()[-1]) >= _SURE
+    sure = stated["probability"].startswith("more") or float(stated["probability"].split()[-1]) >= _MIN_SURE_PROBABILITY
     return _one_of([stated["name"]], truth) if sure else None
 
 
@@ -133,7 +133,7 @@ def _share_of_cause(stated, truth, _facts):
     """The effect has the stated share of the held-out gap."""
     if stated["name"].replace(" ", "_") not in truth.effects:
         return False
-    return abs(float(stated["share"]) / 100.0 - truth.share) <= _NEAR_SHARE
+    return abs(float(stated["share"]) / 100.0 - truth.share) <= _SHARE_TOLERANCE
 
 
 def _size_of_cause(stated, truth, _facts):
@@ -144,7 +144,7 @@ def _size_of_cause(stated, truth, _facts):
     off = float(stated["value"]) - true
     if stated["parameter"].startswith("phase"):
         off = (off + np.pi) % (2.0 * np.pi) - np.pi
-    return abs(off) <= _ERRORS * _error(stated["low_95"], stated["high_95"])
+    return abs(off) <= _STANDARD_ERRORS * _error(stated["low_95"], stated["high_95"])
 
 
 def _error(low, high):
@@ -159,7 +159,7 @@ def _unexplained(_stated, truth, _facts):
 
 def _probability(_stated, truth, facts):
     """An answer with a probability of 0.9 or more is correct; a smaller probability is undecided."""
-    return _verdict_right(facts, truth) if facts["probability"] >= _SURE else None
+    return _verdict_right(facts, truth) if facts["probability"] >= _MIN_SURE_PROBABILITY else None
 
 
 def _scatter(stated, _truth, _facts):
@@ -172,7 +172,7 @@ def _rival(stated, truth, _facts):
     if stated["name"].replace(" ", "_") in truth.effects or (stated["name"].startswith("something") and truth.outside):
         return True
     if stated["name"] == "that nothing acts":
-        return truth.chi2 <= _SEEN
+        return truth.chi2 <= _DETECTABLE_CHI2
     return None
 
 
@@ -183,8 +183,8 @@ def _zero(stated, truth, _facts):
     scale = np.degrees(1.0) if stated["unit"] == "degrees" else 1.0
     true = truth.zeros[stated["site"]], truth.geometry.get(f"d{stated['site']}", np.inf)
     off = min(abs(float(stated["value"]) - scale * zero) for zero in true)
-    links = scale * _OF_LINKS[{"degrees": "rad"}.get(stated["unit"], "mm")]
-    return off <= _ERRORS * _error(stated["low"], stated["high"]) + links
+    links = scale * _LINK_TOLERANCE[{"degrees": "rad"}.get(stated["unit"], "mm")]
+    return off <= _STANDARD_ERRORS * _error(stated["low"], stated["high"]) + links
 
 
 def _zeros_lost(stated, truth, _facts):
@@ -219,23 +219,23 @@ def _needs_different(stated, truth, _facts):
 
 def _within(said, true_mm):
     """Whether an rms agrees with the true one within a tenth."""
-    return abs(float(said) / true_mm - 1.0) <= _REMAINDER if np.isfinite(true_mm) else None
+    return abs(float(said) / true_mm - 1.0) <= _RMS_TOLERANCE if np.isfinite(true_mm) else None
 
 
 def _lost(stated, _truth, facts):
-    """The effect that the file cannot hold is part of the verdict."""
+    """The effect that the file cannot represent is part of the verdict."""
     names = {one["name"] for one in facts["effects"]} | ({"unexplained"} if facts["unexplained"] else set())
     return stated["name"] in names
 
 
 def _lost_kind(name):
-    """A judge of whether an effect of the drives that the file cannot hold is part of the verdict."""
+    """A judge of whether an effect of the drives that the file cannot represent is part of the verdict."""
     return lambda _stated, _truth, facts: name in {one["name"] for one in facts["effects"]}
 
 
 def _noise(stated, truth, _facts):
     """The measurement noise."""
-    return abs(float(stated["value"]) / truth.noise_rms_mm - 1.0) <= _NEAR_NOISE + 1.5 / np.sqrt(truth.rows)
+    return abs(float(stated["value"]) / truth.noise_rms_mm - 1.0) <= _NOISE_TOLERANCE + 1.5 / np.sqrt(truth.rows)
 
 
 def _worst(stated, truth, _facts):
@@ -249,7 +249,7 @@ def _worst(stated, truth, _facts):
         return squares[near].mean()
 
     largest = max(local_mean_square(point) for point in truth.position_mm)
-    return local_mean_square(np.array(stated["at"])) >= _WORST * largest
+    return local_mean_square(np.array(stated["at"])) >= _MIN_WORST_RATIO * largest
 
 
 def _holds(ends, true, digit=0.0):
@@ -259,7 +259,11 @@ def _holds(ends, true, digit=0.0):
 
 def _closed(stated, truth, _facts):
     """Interval of the fraction of the gap at fresh stops that the verdict's effects explain."""
-    return _holds(stated["ends"], 1.0 - (truth.after_mm / truth.before_mm) ** 2, _PRINTED) if truth.before_mm else None
+    return (
+        _holds(stated["ends"], 1.0 - (truth.after_mm / truth.before_mm) ** 2, _PRINTED_ROUNDING)
+        if truth.before_mm
+        else None
+    )
 
 
 def _budget(stated, truth, _facts):
@@ -267,11 +271,11 @@ def _budget(stated, truth, _facts):
     part = stated["part"]
     if stated["kind"] == "effect":
         if part not in truth.effects:
-            return stated["ends"][0] <= _PRINTED
-        return _holds(stated["ends"], truth.share, _PRINTED)
+            return stated["ends"][0] <= _PRINTED_ROUNDING
+        return _holds(stated["ends"], truth.share, _PRINTED_ROUNDING)
     if stated["kind"] == "unexplained":
-        return stated["ends"][1] > 0.0 if truth.outside else stated["ends"][0] <= _PRINTED
-    return stated["ends"][0] <= _PRINTED
+        return stated["ends"][1] > 0.0 if truth.outside else stated["ends"][0] <= _PRINTED_ROUNDING
+    return stated["ends"][0] <= _PRINTED_ROUNDING
 
 
 def _number(stated, truth, _facts):
@@ -296,16 +300,16 @@ def _by_factor(stated, truth, _facts):
         return None
     squares = truth.error_mm**2
     if stated["factor"] == "direction":
-        return _holds(stated["ends"], squares[:, "xyz".index(stated["level"])].sum() / squares.sum(), _PRINTED)
+        return _holds(stated["ends"], squares[:, "xyz".index(stated["level"])].sum() / squares.sum(), _PRINTED_ROUNDING)
     chosen = truth.payload_kg == float(stated["level"].removesuffix(" kg"))
-    return _holds(stated["ends"], squares[chosen].sum() / squares.sum(), _PRINTED)
+    return _holds(stated["ends"], squares[chosen].sum() / squares.sum(), _PRINTED_ROUNDING)
 
 
 def _as_good(_stated, truth, facts):
     """The error of the corrected file is at most a tenth above that of the estimate, or the page states it."""
     if not np.isfinite(truth.file_mm):
         return None
-    if truth.file_mm <= _AS_GOOD * truth.after_mm:
+    if truth.file_mm <= _MAX_FILE_ERROR_RATIO * truth.after_mm:
         return True
     file = facts["corrected_file"]
     return bool(file and (file["remainder"] or file["headline"]))
@@ -344,7 +348,7 @@ def _reflector(stated, truth, _facts):
         return None
     place = np.array(stated["place"].replace("?", "nan").split(", "), dtype=float)
     off = np.nan_to_num(place - truth.places[stated["name"]])
-    return np.linalg.norm(off) <= _MOST_ERRORS * float(stated["about"])
+    return np.linalg.norm(off) <= _MAX_PLACE_ERRORS * float(stated["about"])
 
 
 def _missing(stated, _truth, _facts):
@@ -374,12 +378,17 @@ def _next_inspection(stated, truth, facts):
     words = re.sub(r"^(?:between|whether) | acts$", "", stated["contest"])
     if _one_of(re.split(r" and | \+ ", words), truth):
         return True
-    return False if truth.outside or truth.chi2 > _SEEN else None
+    return False if truth.outside or truth.chi2 > _DETECTABLE_CHI2 else None
+
+
+def _errors_outside_models(_stated, truth, _facts):
+    """The robot has errors outside every model, such as those of MuJoCo's servos: only these make noise look larger."""
+    return truth.outside or truth.still_mm > _MIN_OUTSIDE_PER_NOISE * truth.noise_rms_mm
 
 
 def _turned(stated, _truth, _facts):
     """The instrument's orientations are those of the platform, except the robot's own errors."""
-    return bool(np.radians(float(stated["value"])) <= _NEAR_TURN_RAD)
+    return bool(np.radians(float(stated["value"])) <= _ANGLE_TOLERANCE_RAD)
 
 
 _JUDGES = {
@@ -390,7 +399,7 @@ _JUDGES = {
     "a cause with a share": _cause,
     "a cause with a size": _cause,
     "a cause without a share": _cause,
-    "the corrected file is worse": lambda stated, t, _: t.file_mm > _AS_GOOD * t.after_mm,
+    "the corrected file is worse": lambda stated, t, _: t.file_mm > _MAX_FILE_ERROR_RATIO * t.after_mm,
     "shares are not determined": lambda _, t, __: t.before_mm < t.noise_rms_mm,
     "a common share": lambda stated, t, _: all(_one_of([stated[name]], t) for name in ("first", "second")),
     "shares overlap": _overlap,
@@ -417,25 +426,24 @@ _JUDGES = {
     "points used": _points,
     "few readings": _few,
     "fitted without some points": lambda stated, t, _: int(stated["lacking"]) < int(stated["used"]) <= t.rows,
-    # only errors outside every model, as those of MuJoCo's servos, make it look larger
-    "the noise is larger": lambda _, t, __: t.outside or t.still_mm > _OWN * t.noise_rms_mm,
-    "no cause is found but an error": lambda _, t, __: t.outside or t.still_mm > _OWN * t.noise_rms_mm,
-    "it looks random and repeats": lambda _, t, __: t.outside or t.still_mm > _OWN * t.noise_rms_mm,
-    "it looks random and is correlated": lambda _, t, __: t.outside or t.still_mm > _OWN * t.noise_rms_mm,
-    "successive residuals are correlated": lambda _, t, __: t.outside or t.still_mm > _OWN * t.noise_rms_mm,
+    "the noise is larger": _errors_outside_models,
+    "no cause is found but an error": _errors_outside_models,
+    "it looks random and repeats": _errors_outside_models,
+    "it looks random and is correlated": _errors_outside_models,
+    "successive residuals are correlated": _errors_outside_models,
     "repeatability is unknown": lambda _, t, __: not t.again,
     "repeatability is unsure": lambda _, t, __: t.again,
     "an effect needs what is not there": _needs,
     "an effect needs different values": _needs_different,
     "an effect is a calibration's number": lambda stated, t, _: stated["name"] not in t.effects,
-    "an effect is absorbed": lambda stated, t, _: not (stated["name"] in t.effects and t.chi2 > _SEEN),
+    "an effect is absorbed": lambda stated, t, _: not (stated["name"] in t.effects and t.chi2 > _DETECTABLE_CHI2),
     "the file leaves": lambda stated, t, _: _within(stated["value"], t.file_read_mm),
     "the file would be worse": lambda stated, t, _: _within(stated["other"], t.given_read_mm),
     "the file cannot hold play": _lost_kind("backlash"),
     "the file cannot hold compliance": _lost_kind("drive_compliance"),
     "the file cannot hold an effect": _lost,
     "no such column": _missing,
-    "registered": lambda stated, t, _: _MOST_LEFT * t.rows <= int(stated["points"]) <= t.rows,
+    "registered": lambda stated, t, _: _MIN_INLIER_SHARE * t.rows <= int(stated["points"]) <= t.rows,
     "a reflector was found": _reflector,
     "orientations are turned": _turned,
     "zeros are lost": _zeros_lost,

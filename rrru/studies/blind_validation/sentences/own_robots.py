@@ -16,13 +16,13 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 G = 9.80665
-# steps of central differences
+# steps of central differences, in the unit of the drive
 _STEP = {"mm": 1e-2, "rad": 1e-5}
 _SERVO = {"rad": "1e8", "mm": "1e8"}
 _DAMPING = {"rad": "4e4", "mm": "2e4"}
 _ARMATURE = {"rad": "5", "mm": "5"}
-_NEWTON_STEPS, _CLOSED_MM = 30, 1e-9
-_TINY, _LARGEST_STEP = 1e-12, np.repeat([100.0, 0.3], 3)
+_NEWTON_STEPS, _MAX_OPENING_MM = 30, 1e-9
+_REGULARIZATION, _LARGEST_STEP = 1e-12, np.repeat([100.0, 0.3], 3)
 # struts: centre of the cylinder from its foot, of the piston from its ball; length of the piston
 _CYLINDER_MM, _PISTON_MM, _ROD_MM = 120.0, 120.0, 250.0
 
@@ -126,12 +126,12 @@ class Chain(OwnRobot):
         """
         joints, before = [], ()
         for joint in self.joints:
-            shift = length_mm * generator.standard_normal(3) * _across("mm", joint, *before)
-            turn = angle_rad * generator.standard_normal(3) * _across("rad", joint, *before)
+            shift = length_mm * generator.standard_normal(3) * _free_directions("mm", joint, *before)
+            turn = angle_rad * generator.standard_normal(3) * _free_directions("rad", joint, *before)
             seat = tuple((np.array(joint.seat_mm) + shift).tolist())
-            joints.append(replace(joint, seat_mm=seat, seat_rad=_turned(joint.seat_rad, turn)))
+            joints.append(replace(joint, seat_mm=seat, seat_rad=_composed_rotation(joint.seat_rad, turn)))
             before = (joint,)
-        tip = np.array(self.tip_mm) + length_mm * generator.standard_normal(3) * _across("mm", *before)
+        tip = np.array(self.tip_mm) + length_mm * generator.standard_normal(3) * _free_directions("mm", *before)
         return replace(self, joints=tuple(joints), tip_mm=tuple(tip.tolist()))
 
     def section(self, file, kind):
@@ -253,13 +253,13 @@ class Rods(OwnRobot):
             along = (rod / size[:, None, :]).transpose(0, 2, 1)
             jacobian = np.concatenate([along, np.cross(lever.transpose(0, 2, 1), along)], axis=2)
             # a pose that diverges is not closed at the end
-            step = np.linalg.solve(jacobian + _TINY * np.eye(6), (length - size)[:, :, None])[:, :, 0]
+            step = np.linalg.solve(jacobian + _REGULARIZATION * np.eye(6), (length - size)[:, :, None])[:, :, 0]
             step = np.clip(step, -_LARGEST_STEP, _LARGEST_STEP)
             place = place + step[:, :3]
             turn = Rotation.from_rotvec(step[:, 3:]).as_matrix() @ turn
-            if np.abs(length - size).max() < _CLOSED_MM:
+            if np.abs(length - size).max() < _MAX_OPENING_MM:
                 break
-        lost = ~(np.abs(length - size).max(axis=1) < _CLOSED_MM)
+        lost = ~(np.abs(length - size).max(axis=1) < _MAX_OPENING_MM)
         place[lost], turn[lost] = np.nan, np.nan
         return place, turn
 
@@ -268,20 +268,19 @@ class Rods(OwnRobot):
         place, turn = self.poses(values)
         head = place[:, None, :] + (turn @ self.head_mm.T).transpose(0, 2, 1)
         platform_kg, moved_kg, rod_kg = self.masses_kg
-        foot, middle = self._feet(values), 0.5 * (self._feet(values) + head)
-        height = (platform_kg + payload_kg) * place[:, 2] + rod_kg * middle[:, :, 2].sum(axis=1)
+        foot = self._feet(values)
+        height = (platform_kg + payload_kg) * place[:, 2]
         first = [self.drive.index(k) for k in range(len(self.units))]
         if self.kind == "strut":
             # the piston has its centre at a fixed distance behind its ball
             behind = (head - foot) / np.linalg.norm(head - foot, axis=2, keepdims=True)
-            height = (platform_kg + payload_kg) * place[:, 2]
             height = height + rod_kg * (head - _PISTON_MM * behind)[:, :, 2].sum(axis=1)
             height = height + moved_kg * (foot + _CYLINDER_MM * behind)[:, :, 2].sum(axis=1)
-        elif self.kind == "rail":
-            height = height + moved_kg * foot[:, first, 2].sum(axis=1)
-        else:
-            height = height + moved_kg * 0.5 * foot[:, first, 2].sum(axis=1)
-        return G * height
+            return G * height
+        height = height + rod_kg * (0.5 * (foot + head))[:, :, 2].sum(axis=1)
+        # a crank has its centre halfway between its axis, which does not move, and its ball
+        moved_share = 1.0 if self.kind == "rail" else 0.5
+        return G * (height + moved_share * moved_kg * foot[:, first, 2].sum(axis=1))
 
     def _feet(self, values):
         """Balls (n, 6, 3) on the drives."""
@@ -314,7 +313,7 @@ class Rods(OwnRobot):
                 np.repeat(points[::2] - nominal_points[::2], 2, axis=0) + nominal_points
                 for points, nominal_points in ((foot, self.foot_mm), (head, self.head_mm))
             )
-        shift, way = foot - self.foot_mm, self._way()
+        shift, way = foot - self.foot_mm, self._drive_directions()
         foot = self.foot_mm + (shift - (shift * way).sum(axis=1, keepdims=True) * way)
         # an error of a strut's length is a zero offset
         extra = length_mm * generator.standard_normal(6) * (self.kind != "strut")
@@ -325,7 +324,7 @@ class Rods(OwnRobot):
         moved = np.linalg.norm(self.home_mm + head - foot, axis=1)
         return replace(self, foot_mm=foot, head_mm=head, axis=axis, extra_mm=nominal - moved + extra)
 
-    def _way(self):
+    def _drive_directions(self):
         """Unit vectors (6, 3) along which the drives move the balls at actuator positions of 0, zero where fixed."""
         if self.kind == "strut":
             return np.zeros((6, 3))
@@ -441,12 +440,12 @@ def _quat(vector_rad):
     return _spaced((w, x, y, z))
 
 
-def _turned(first_rad, then_rad):
+def _composed_rotation(first_rad, then_rad):
     """Rotation vector of two rotations, the second in the frame rotated by the first."""
     return tuple((Rotation.from_rotvec(first_rad) * Rotation.from_rotvec(then_rad)).as_rotvec().tolist())
 
 
-def _across(unit, *joints):
+def _free_directions(unit, *joints):
     """0 or 1 (3,) for every direction: 0 along the axes of those joints that have this unit."""
     axes = [np.abs(joint.axis) for joint in joints if joint.unit == unit]
     return 1.0 - np.max([np.zeros(3), *axes], axis=0)
