@@ -19,7 +19,11 @@ _CURVE_SHARES = np.linspace(0.0, 1.0, 401)
 
 @dataclass(frozen=True)
 class Run:
-    """One pass along a trajectory: its points (n, 3) in order, the profile, and the path it takes."""
+    """One pass along a trajectory.
+
+    points_mm (n, 3): sampled points in order, with time_s (n,), velocity_mm_s and acceleration_mm_s2 (n, 3) there;
+    path_mm (N, 3): the finer path, in whose rows path_index (n,) the points are; speed_mm_s: of the profile.
+    """
 
     trajectory: str
     points_mm: np.ndarray
@@ -76,7 +80,7 @@ class Plan:
     def path(self) -> tuple[np.ndarray, np.ndarray]:
         """Positions (N, 3) along all that is driven, transfers included, and the rows (n,) of the sampled points.
 
-        # ASSUME the robot goes straight from the end of a run to the start of the next.
+        The robot is assumed to go straight from the end of a run to the start of the next.
         """
         return connect([run.path_mm for run in self.runs], [run.path_index for run in self.runs], 2 * _PATH_STEPS)
 

@@ -46,8 +46,8 @@ def budget(
     measured = float((residual[inference.problem.on_robot] ** 2).sum(axis=1).mean()) - instrument * (1.0 - left.taken)
     calibration = instrument / 3.0 * left.error(generator, draws)
     biased = drawn if inference.fit.bias is None else _drawn(inference, left, generator, draws, biased=True)
-    least = OPTIONS.min_covariance_share * max(measured, 1e-12)
-    pairs = [pair for pair, some in drawn.products.items() if abs(some.mean()) > least]
+    min_product = OPTIONS.min_covariance_share * max(measured, 1e-12)
+    pairs = [pair for pair, products in drawn.products.items() if abs(products.mean()) > min_product]
     parts, wide = (
         {(name, "effect"): one.squares[name] for name in one.acting}
         | {(name, name): some for name, (some, _) in noise.items()}
@@ -129,8 +129,8 @@ def _drawn(
                 products[pair][some] = 2.0 * (parts[pair[0]] * parts[pair[1]]).sum(axis=0) / count
         if posterior.unexplained[row, level] and (lacks_fit or _UNEXPLAINED not in parts):
             beyond = data - sum(parts.values(), np.zeros((len(data), counts[number])))
-            spare = 3.0 * problem.noise_mm**2 * (1.0 - left.taken)
-            squares[_UNEXPLAINED][some] += np.maximum((beyond**2).sum(axis=0) / count - spare, 0.0)
+            noise = 3.0 * problem.noise_mm**2 * (1.0 - left.taken)
+            squares[_UNEXPLAINED][some] += np.maximum((beyond**2).sum(axis=0) / count - noise, 0.0)
     return _Drawn(squares, acting, products)
 
 
@@ -152,13 +152,13 @@ def _parts(
         return {}
     mean, covariance = evidence.coefficients(hypothesis.terms, hypothesis.prior_scales[level], level)
     if biased is not None and biased.bias is not None:
-        own, of_fit = _places(evidence, hypothesis, biased)
+        own, of_fit = _coefficient_numbers(evidence, hypothesis, biased)
         covariance[np.ix_(own, own)] += biased.bias[np.ix_(of_fit, of_fit)]
-    # coefficients have very different sizes
+    # coefficients have very different sizes: the eigenvalues are those of the correlation matrix
     unit = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
-    size, turned = np.linalg.eigh(covariance / np.outer(unit, unit))
-    shaken = unit[:, None] * turned * np.sqrt(np.maximum(size, 0.0))
-    drawn = mean[:, None] + shaken @ generator.standard_normal((len(mean), count))
+    eigenvalues, eigenvectors = np.linalg.eigh(covariance / np.outer(unit, unit))
+    factor = unit[:, None] * eigenvectors * np.sqrt(np.maximum(eigenvalues, 0.0))
+    drawn = mean[:, None] + factor @ generator.standard_normal((len(mean), count))
     result: dict[str, FloatArray] = {}
     start, linear = 0, evidence.linear
     made = signatures(evidence.library, linear, hypothesis.terms)
@@ -179,7 +179,7 @@ def _parts(
     return result
 
 
-def _places(evidence: ModelEvidence, hypothesis: Hypothesis, fit: ModelFit) -> tuple[IntArray, IntArray]:
+def _coefficient_numbers(evidence: ModelEvidence, hypothesis: Hypothesis, fit: ModelFit) -> tuple[IntArray, IntArray]:
     """Numbers (k,) of the coefficients of a hypothesis that a fit has, too, and those of the fit's parameters."""
     slices, count = fit.estimate.parameters.slices, len(fit.estimate.values)
     own, of_fit, start = [np.zeros(0, dtype=int)], [np.zeros(0, dtype=int)], 0
@@ -198,7 +198,7 @@ def _noise_parts(
     """Draws (b,) of the instrument's mean square, and by name draws and probability of scatter and runs."""
     problem = inference.problem
     model = problem.noise or NoiseModel.white(problem.noise_mm)
-    # of each axis: a parameter takes one of the numbers of all three
+    # degrees of freedom of one axis: the parameters are fitted to all three axes together
     freedom = max(len(problem) - inference.evidence.linear.calibration_basis.shape[1] / 3.0, 1.0)
     axes = model.axis_mm**2 * (1.0 + np.sqrt(2.0 / freedom) * generator.standard_normal((draws, 3)))
     scatter, probability = np.zeros((draws, 3)), np.nan

@@ -23,14 +23,14 @@ def require_determined(problem: DiagnosisProblem, whose: str = "") -> DiagnosisP
     The others have to determine the calibration with `OPTIONS.min_spare_numbers` to spare. whose: first words of a
     message. Raises FitError where all readings together do not.
     """
-    columns = observations_of(problem).jacobian(problem.mechanism.parameters.nominal)
-    rank = _rank(columns)
+    jacobian = observations_of(problem).jacobian(problem.mechanism.parameters.nominal)
+    rank = _rank(jacobian)
     if why := _why_undetermined(problem, rank):
         raise FitError(f"{whose}{why}")
     few = {}
     for name in problem.known:
         rows = problem.complete([name])
-        if rows.mean() < OPTIONS.min_complete_share or not _is_determined(columns[rows], rank):
+        if rows.mean() < OPTIONS.min_complete_share or not _is_determined(jacobian[rows], rank):
             few[name] = _too_few(problem, name, rows, rank)
     if not few:
         return problem
@@ -42,7 +42,7 @@ def require_determined(problem: DiagnosisProblem, whose: str = "") -> DiagnosisP
 
 
 def poses_needed(problem: DiagnosisProblem) -> tuple[int, int, int]:
-    """Rank of the calibration at a problem's poses, poses that a diagnosis needs at least and poses that were read."""
+    """Rank of the calibration at a problem's poses, least number of poses for a diagnosis, number of poses read."""
     rank = _rank(observations_of(problem).jacobian(problem.mechanism.parameters.nominal))
     poses = len(np.unique(problem.stop))
     return rank, int(np.ceil((rank + OPTIONS.min_spare_numbers) * poses / (3 * len(problem)))), poses
@@ -57,14 +57,14 @@ def few_readings(problem: DiagnosisProblem) -> str | None:
     return f"few readings: {numbers} numbers for {count} parameters of the calibration; {found}"
 
 
-def _is_determined(columns: FloatArray, rank: int) -> bool:
-    """Whether numbers with these derivatives (m, 3, p) determine so many combinations of parameters, some to spare."""
-    return 3 * len(columns) >= rank + OPTIONS.min_spare_numbers and _rank(columns) == rank
+def _is_determined(jacobian: FloatArray, rank: int) -> bool:
+    """Whether readings with this Jacobian (m, 3, p) have the rank, and the least number of spare numbers."""
+    return 3 * len(jacobian) >= rank + OPTIONS.min_spare_numbers and _rank(jacobian) == rank
 
 
-def _rank(columns: FloatArray) -> int:
-    """Numerical rank of derivatives (m, 3, p), each parameter by how far it moves what is read."""
-    flat = columns.reshape(-1, columns.shape[-1])
+def _rank(jacobian: FloatArray) -> int:
+    """Numerical rank of a Jacobian (m, 3, p) whose columns are scaled to unit length."""
+    flat = jacobian.reshape(-1, jacobian.shape[-1])
     size = np.maximum(np.linalg.norm(flat, axis=0), 1e-300)
     return int(np.linalg.matrix_rank(np.linalg.qr(flat / size, mode="r"), rtol=RANK_TOLERANCE))
 
@@ -82,7 +82,7 @@ def _why_undetermined(problem: DiagnosisProblem, rank: int) -> str:
 
 
 def _too_few(problem: DiagnosisProblem, name: str, rows: BoolArray, rank: int) -> str:
-    """Why an effect that has what it needs at some rows (m,) is not tested."""
+    """Why an effect whose needs are known at some rows (m,) only is not tested."""
     what = "what it needs"
     if has_direction(problem.library[name]):
         what = "the sense in which the drives arrive, unknown at starts of runs and next to reversals of a drive,"

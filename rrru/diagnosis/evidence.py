@@ -1,4 +1,4 @@
-"""Evidence of a hypothesis: the marginal likelihood of a linear model, all its parameters averaged out.
+"""Evidence of a hypothesis: the marginal likelihood of a linear model, all its parameters marginalised.
 
 Along each run the data d (one axis, k points) are
 
@@ -152,10 +152,11 @@ class ModelEvidence:
             power, total = (
                 (all_of[index] * size**2).sum() / (3.0 * len(self)) for all_of in (gram, self._whitened.whole)
             )
-            # rounding is left of what the calibration absorbs: it must not be scaled up to the size of an effect
+            # only rounding remains of a term that the calibration absorbs: do not scale it up to the size of an effect
             unit = np.sqrt(max(power, OPTIONS.min_visible_share * total, 1e-30))
             if coordinates.sized:
-                # the data determine the size of many coefficients better than the grid resolves: one scale is just it
+                # the data determine the size of many coefficients better than the grid resolves: their typical size is
+                # made one of its scales
                 unit = PRIOR_SCALES[np.abs(np.log(PRIOR_SCALES / unit)).argmin()]
             size /= unit
             most = np.broadcast_to(coordinates.most, len(coordinates))
@@ -305,7 +306,7 @@ class ModelEvidence:
         return gram, across, moment, problem, problem.scale(prior_scales[None])[0]
 
     def _broadest(self, terms: Sequence[EffectTerm]) -> int | None:
-        """Number of the term of the most coefficients if these are many, None where no term has."""
+        """Number of the broad term, the one with the most coefficients, None where no term has many."""
         broad = [k for k, term in enumerate(terms) if self.library[term.effect].coordinates.broad]
         return max(broad, key=lambda k: len(self._prior(terms[k]).columns), default=None)
 
@@ -353,7 +354,7 @@ class ModelEvidence:
 
     @cached_property
     def _means(self) -> Latest:
-        # the last one: parts of a hypothesis are asked for one after another
+        # only the last result: the effects of one hypothesis are asked for one after another
         return Latest(1)
 
     @cached_property
@@ -459,7 +460,7 @@ class _AlongPriorScales:
     def __init__(self, after: Callable[[FloatArray], tuple[FloatArray, MarginalProblem]], broad: int | None) -> None:
         self._after, self._broad = after, broad
         self._made: dict[float, tuple[FloatArray, MarginalProblem]] = {}
-        # the last sweep asks again for terms after which none has moved
+        # the last sweep asks again for the terms whose others have not changed since
         self._known: dict[tuple[float, ...], FloatArray] = {}
 
     def of_term(self, k: int, prior_scales: FloatArray) -> FloatArray:

@@ -34,9 +34,9 @@ from rrru.estimation.solver import SolverOptions, solve
 from rrru.kinematics.parameter_jacobian import TwistMap
 
 _SOLVER_OPTIONS = SolverOptions(step_tolerance=OPTIONS.step_tolerance_per_standard_error)
-# a standard deviation that differs by less from that of the prior is this one's
-_ROUNDING = 1e-9
-_MANY_OPTIONS = SolverOptions(OPTIONS.max_iterations_of_many, OPTIONS.step_tolerance_of_many)
+# relative reduction of a prior's standard deviation below which the readings do not inform a parameter; rounding
+_MIN_SD_REDUCTION = 1e-9
+_OPTIONS_OF_MANY = SolverOptions(OPTIONS.max_iterations_of_many, OPTIONS.step_tolerance_of_many)
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +65,7 @@ class EffectModel:
 
     @cached_property
     def shapes(self) -> dict[str, dict[str, float]]:
-        """Anchor values of shape parameters by effect."""
+        """Prior means of the shape parameters, by effect."""
         return {t.effect: dict(self.problem.library[t.effect].coordinates.shapes[t.shape]) for t in self.terms}
 
     @cached_property
@@ -253,7 +253,7 @@ class ModelFit:
         parameters, prefix = self.estimate.parameters, f"{term.effect}."
         coefficients = np.arange(len(parameters))[parameters.slices[term.effect]]
         sd = np.sqrt(np.diag(self.estimate.covariance))
-        informed = sd < (1.0 - _ROUNDING) * parameters.sd
+        informed = sd < (1.0 - _MIN_SD_REDUCTION) * parameters.sd
         shapes = [k for k, name in enumerate(parameters.names) if name.startswith(prefix) and informed[k]]
         return [*coefficients, *shapes], [parameters.names[k].removeprefix(prefix) for k in shapes]
 
@@ -312,7 +312,7 @@ def fit_model(
         # where the exact model has no pose at a start with effects, it has one without them
         candidates = [model.vector(start), model.vector(ModelState(start.deviations, {}))]
         candidate = next((v for v in candidates if np.isfinite(model.residual(v)).all()), candidates[-1])
-        fits.append(solve(estimation, [candidate], _MANY_OPTIONS if many else _SOLVER_OPTIONS))
+        fits.append(solve(estimation, [candidate], _OPTIONS_OF_MANY if many else _SOLVER_OPTIONS))
         if (fits[-1].end.straight and fits[-1].end.converged) or many:
             break
     enough = min(fit.end.cost for fit in fits) + OPTIONS.equal_fits_nats
@@ -321,7 +321,7 @@ def fit_model(
 
 def fit_named_effects(
     problem: DiagnosisProblem,
-    names: Iterable[str],
+    names: Sequence[str],
     calibrated: ModelState,
     times_typical: float = OPTIONS.prior_sd_per_typical,
 ) -> ModelFit:

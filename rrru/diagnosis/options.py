@@ -88,7 +88,8 @@ class DiagnosisOptions:
     window_nats: float = 6.0
     # a set so far below the best at one level is tried at no other: e^-15 is 3e-7
     hopeless_nats: float = 15.0
-    # a noise whose evidence by a climb alone is so far too low is not searched in full: that has added 0.3 nats
+    # a noise model whose evidence after a climb alone is so far below the best gets no full search, which has added at
+    # most 0.3 nats
     max_climb_below_nats: float = 3.0
     # a set of a smaller share of the probability has no neighbours that matter; assumed
     min_expanded_probability: float = 0.01
@@ -132,9 +133,10 @@ class DiagnosisOptions:
     # --- posterior and verdict ---
     # hypotheses so far below the best have no probability that matters: e^-25 is 1e-11
     negligible_nats: float = 25.0
-    # an effect that predicts left-out points worse by more is ruled out; with something unexplained it has to gain it
+    # an effect that predicts left-out points worse by more than this is ruled out; with something unexplained it has to
+    # predict them better by as much
     max_heldout_loss_nats: float = 3.0
-    # an answer with which more stops are predicted worse than by chance, by so many standard deviations, is none; the
+    # an answer is rejected where it predicts more stops worse than chance does, by so many standard deviations; the
     # usual 5 %
     max_further_off: float = 2.0
     # no cause is named while "none" is more probable: a false alarm costs more than a small gap that is not found
@@ -206,7 +208,7 @@ class DiagnosisOptions:
     interval_quantiles: tuple[float, float] = (0.025, 0.975)
     # the worst spot is the middle of so many neighbours with the largest mean square; assumed
     worst_spot_neighbours: int = 9
-    # a speed or payload of more distinct values is no factor; assumed
+    # a speed or payload with more distinct values than this is not a factor; assumed
     max_factor_levels: int = 12
     # noise explains a part that is smaller than what noise exceeds with this probability; the usual 5 %
     min_noise_p_value: float = 0.05
@@ -258,7 +260,7 @@ class DiagnosisOptions:
     # than these: assumed, as of zeros
     min_serial_correlation: float = 0.5
     min_serial_z: float = 4.0
-    # a share beyond this is none: confounded effects add up to a little more than the whole; assumed
+    # a larger share is not printed: confounded effects add up to a little more than the whole; assumed
     max_mentioned_share: float = 1.5
 
     # --- experiment design: the next runs and poses ---
@@ -286,16 +288,17 @@ class DiagnosisOptions:
     min_rival_answer_probability: float = 0.02
     # axes of the covariance of an effect's coefficients along which data are made; assumed, bounds the time
     max_spread_axes: int = 6
-    # poses are advised where no run resolves so much of the doubt; assumed
+    # poses are advised where no run resolves this share of the doubt; assumed
     decisive_share: float = 0.9
-    # beyond a few poses no more are chosen than resolve so much, each at least this share of the rest; assumed
+    # after the first few poses others are chosen until this share of the doubt is resolved, each only if it resolves at
+    # least the given share of the rest; assumed
     enough_share: float = 0.95
     few_poses: int = 10
     min_share_of_rest: float = 0.05
     # less expected log Bayes factor than this is not worth a run: it is "not worth more than a bare mention" (Kass and
     # Raftery, Bayes factors, Journal of the American Statistical Association 90, 1995)
     min_run_gain_nats: float = 1.0
-    # as much makes a rival 20 times less probable, which rules it out
+    # this gain makes a rival 20 times less probable, which rules it out
     decisive_gain_nats: float = 3.0
     # points that are read on a short pass, and its length; assumed
     points_per_pass: int = 5

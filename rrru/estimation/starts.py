@@ -31,15 +31,14 @@ from rrru.kinematics.robot import Robot
 
 # a median residual above this share of the robot's size is not due to errors of its geometry
 FAR_SHARE_OF_SIZE = 2e-3
-# a median residual above this share of the robot's size is that of a frame in which no search can begin
+# a median residual above this share of the robot's size means another frame: no search converges from there
 LOST_SHARE_OF_SIZE = 0.05
 # an instrument's own frame is off by metres, of which a registration leaves thousandths; lost zero offsets of drives,
 # which `rrru.campaign.ingest.zero_offsets` finds with the frame, leave more than this share
 _MAX_SHARE_AFTER = 0.02
-# residual at which a reading begins to count less while zero offsets of drives are far off
-_BEND_MM = 5.0
+# scale of the robust loss: residual beyond which a reading counts less, while zero offsets of drives are far off
+_LOSS_SCALE_MM = 5.0
 _MIN_READINGS = 3
-_AXES = "xyz"
 
 
 def register_poses(
@@ -47,8 +46,8 @@ def register_poses(
 ) -> TargetRegistration:
     """The TargetRegistration of Readings at Poses under twists (1, sites, 6) of a robot.
 
-    Places of the robot's `measurement_config.fitted` are unknown, the others are where the twists have them; mirrored:
-    of an instrument with a left-handed frame. Raises FitError for fewer than three readings at known poses.
+    Places of targets in the robot's `measurement_config.fitted` are unknown; the twists give the others. mirrored: the
+    instrument has a left-handed frame. Raises FitError for fewer than three readings at known poses.
     """
     _, number, place = _targets(robot, twists, readings)
     centre, turn = poses.position_mm, poses.turn
@@ -176,7 +175,7 @@ def starting_values(residuals: RobotReadings) -> tuple[FloatArray, int]:
 
     residuals: of readings in the robot's frame. The nominal ones where the nominal robot is near; else the robot's
     `stages` one after the other, such as frames and then with these the drives, robustly. A search over all parameters
-    at once would move hardly determined combinations to fit second-order terms of large turns.
+    at once would move poorly determined combinations of parameters to fit second-order terms of large rotations.
     """
     robot, evaluations = residuals.mechanism, 0
     found = np.asarray(robot.parameters.nominal)
@@ -192,7 +191,7 @@ def starting_values(residuals: RobotReadings) -> tuple[FloatArray, int]:
 
 
 @dataclass(frozen=True, eq=False)
-class _Along:
+class _StageReadings:
     """Observations whose parameters are changes of some deviations (p,) from an origin."""
 
     residuals: RobotReadings
@@ -213,7 +212,9 @@ def solve_along(residuals: RobotReadings, origin: FloatArray, stage: npt.NDArray
     parameters = [one for one, chosen in zip(residuals.mechanism.parameters, stage, strict=True) if chosen]
     sd = np.array([(one.high - one.low) / np.sqrt(12.0) for one in parameters])
     block = Block.of("stage", [one.name for one in parameters], [one.unit for one in parameters], sd)
-    problem = Problem(_Along(residuals, origin, stage), Parameters((block,)), loss="soft_l1", loss_scale=_BEND_MM)
+    problem = Problem(
+        _StageReadings(residuals, origin, stage), Parameters((block,)), loss="soft_l1", loss_scale=_LOSS_SCALE_MM
+    )
     return solve(problem)
 
 

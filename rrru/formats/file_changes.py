@@ -24,7 +24,7 @@ from rrru.kinematics.base_parameters import Candidate
 from rrru.kinematics.legs import TOOL, WORLD
 
 _BALL = mujoco.mjtJoint.mjJNT_BALL
-_NOTHING, _STAYS = np.zeros(6), (np.eye(4), "")
+_NO_TWIST, _NO_CHANGE = np.zeros(6), (np.eye(4), "")
 # smaller changes, in mm and rad, are rounding
 SAME = 1e-10
 
@@ -100,7 +100,9 @@ def scatter(
     count = max((len(part) for part in spread.values()), default=0)
     for k in range(count):
         steps = ({s: sign * part[k] for s, part in spread.items()} for sign in (-1.0, 1.0))
-        low, high = (numbers({**twists, **{s: twists.get(s, _NOTHING) + d for s, d in step.items()}}) for step in steps)
+        low, high = (
+            numbers({**twists, **{s: twists.get(s, _NO_TWIST) + d for s, d in step.items()}}) for step in steps
+        )
         for key, value in high.items():
             squares[key] = squares.get(key, 0.0) + (0.5 * difference(low[key], value)) ** 2
     return {key: np.sqrt(value) for key, value in squares.items()}
@@ -120,13 +122,13 @@ def placement_of(twist: np.ndarray) -> np.ndarray:
 
 def _frames(found: Found, twists: TwistsBySite) -> dict[str, np.ndarray]:
     """Places on the platform of the tool, where it has moved, and of the reflectors."""
-    twist, tool_mm, frames = twists.get(TOOL, _NOTHING), np.asarray(found.tool_mm), {}
+    twist, tool_mm, frames = twists.get(TOOL, _NO_TWIST), np.asarray(found.tool_mm), {}
     tool = placement_of(twist)
     if np.any(twist):
         frames[MEASURED_TOOL] = placed(tool_mm) @ tool
     for name, place in found.reflectors.items():
         at = placed(tool_mm) @ tool @ placed(place - tool_mm)
-        frames[name] = placed(twists.get(name, _NOTHING)[:3]) @ at
+        frames[name] = placed(twists.get(name, _NO_TWIST)[:3]) @ at
     return frames
 
 
@@ -139,7 +141,7 @@ def _between(
     """
     assembly, by_site = structure.assembly, _of_chains(structure, twists)
     first_site = structure.open_legs.legs[0].joints[0].name
-    base = placement_of(twists.get(WORLD, _NOTHING)) @ by_site.get(first_site, np.eye(4))
+    base = placement_of(twists.get(WORLD, _NO_TWIST)) @ by_site.get(first_site, np.eye(4))
     result: dict[int, _ActsAt] = {}
     ends: dict[int, np.ndarray] = {}
     tip = None
@@ -157,7 +159,7 @@ def _between(
             part = seam.other(part)
         first, last, end = path[0], path[-1], by_site.get(leg.joints[-1].name, np.eye(4))
         _at_end(result, assembly.seams[first], first, assembly.base, base)
-        if _hangs_on(assembly, last):
+        if _is_chain_tip(assembly, last):
             tip = end
         elif np.allclose(ends.setdefault(last, end), end, rtol=0.0, atol=1e-12):
             _at_end(result, assembly.seams[last], last, assembly.platform, inverse_placement(end))
@@ -167,14 +169,14 @@ def _between(
 
 
 def _at_end(result: dict[int, _ActsAt], seam: Seam, number: int, part: int, placement: np.ndarray) -> None:
-    """Enter the placement that moves a seam's end at a part, seen from there."""
+    """Enter the placement that moves the end of a seam at a part; the placement is in this part's frame."""
     if part == seam.near:
         result[number][0] = placement, ""
     else:
         result[number][len(seam.items)] = inverse_placement(placement), ""
 
 
-def _hangs_on(assembly: Assembly, last: int) -> bool:
+def _is_chain_tip(assembly: Assembly, last: int) -> bool:
     """Whether the platform is a body without joints that one chain ends in, so that its own place can be changed."""
     model, body, seam = assembly.model, assembly.platform, assembly.seams[last]
     if len(assembly.paths) > 1 or model.body_jntnum[body] or seam.body is None or seam.far != assembly.platform:
@@ -190,7 +192,7 @@ def _of_chains(structure: Structure, twists: TwistsBySite) -> dict[str, np.ndarr
     for number, cut in structure.cuts.items():
         leg, chain = structure.legs.legs[number], structure.open_legs.legs[number]
         seat, (bar, end) = chain.joints[len(leg.joints) - 1], leg.bar_sites
-        near, length, far = (twists.get(name, _NOTHING) for name in (leg.joints[-1].name, bar, end))
+        near, length, far = (twists.get(name, _NO_TWIST) for name in (leg.joints[-1].name, bar, end))
         result[seat.name] = placed(seat.turn.T @ near[:3])
         result[cut.behind] = placed(length[0] * cut.along)
         result[chain.joints[-1].name] = placed(far[:3])
@@ -226,12 +228,12 @@ def _anchors(assembly: Assembly, seam: Seam, between: _ActsAt, lost: list[str]) 
     near, far = np.eye(4), np.eye(4)
     for k in range(len(seam.items)):
         if k > moves[-1]:
-            far = far @ between.get(k, _STAYS)[0] @ seam.placement(k)
+            far = far @ between.get(k, _NO_CHANGE)[0] @ seam.placement(k)
         elif k <= moves[0]:
-            near = near @ between.get(k, _STAYS)[0] @ (np.eye(4) if k == moves[0] else seam.placement(k))
+            near = near @ between.get(k, _NO_CHANGE)[0] @ (np.eye(4) if k == moves[0] else seam.placement(k))
         elif k in between:
             _lose(lost, between[k][1], between[k][0])
-    far = far @ between.get(len(seam.items), _STAYS)[0]
+    far = far @ between.get(len(seam.items), _NO_CHANGE)[0]
     moved = {
         seam.near: near @ inverse_placement(seam.placement(0)),
         seam.far: inverse_placement(far) @ seam.placement(moves[-1] + 1) @ seam.placement(-1),

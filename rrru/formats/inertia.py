@@ -5,8 +5,7 @@ Six points on a body's principal axes have its mass m, centre and inertia I:
     each m / 6, at +- sqrt(3 S_k / m) from the centre along axis k,   S_k = (trace I) / 2 - I_k
 
 Of a bar only the distribution along it is known: two points have its mass, its centre's place along it and its inertia
-across.
-Lengths in mm, masses in kg.
+across. Lengths in mm, masses in kg.
 """
 
 import mujoco
@@ -24,7 +23,7 @@ from rrru.kinematics.point_masses import PLATFORM, PointMass
 def points_of(model: mujoco.MjModel, body: int) -> np.ndarray:
     """Points (6, 3) in mm in a body's frame, each of a sixth of its mass, that have its centre and inertia."""
     mass, inertia = model.body_mass[body], model.body_inertia[body]
-    # triangle inequalities may be missed by rounding
+    # rounding may violate the triangle inequalities
     second = np.maximum(0.5 * inertia.sum() - inertia, 0.0)
     arms = turn_of(model.body_iquat[body]) * np.sqrt(3.0 * second / mass)
     return np.asarray(MM * (model.body_ipos[body] + np.concatenate([arms.T, -arms.T])))
@@ -39,12 +38,12 @@ def point_masses_of(chains: Chains, open_legs: Legs, legs: Legs) -> tuple[PointM
             continue
         part, there = assembly.frames[holder]
         home = inverse_placement(assembly.home_of(holder)) @ assembly.home_of(body)
-        at = _moved(there @ home, points_of(assembly.model, body))
+        at = _transformed(there @ home, points_of(assembly.model, body))
         if part == assembly.frames[assembly.platform][0]:
             result += [PointMass(PLATFORM, mass / 6.0, point) for point in at]
             continue
         place = chains.parts[part]
-        at, leg = _moved(place.placement, at), legs.legs[place.leg]
+        at, leg = _transformed(place.placement, at), legs.legs[place.leg]
         if leg.bar and place.joint >= len(leg.joints) - 1:
             result += _of_bar(open_legs, legs, place, leg.bar, mass, at)
         else:
@@ -60,8 +59,8 @@ def _holder(chains: Chains, body: int) -> int | None:
     return body if assembly.frames[body][0] in chains.parts else None
 
 
-def _moved(placement: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Points (n, 3) behind a placement."""
+def _transformed(placement: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Points (n, 3) transformed by a placement."""
     return np.asarray(points @ placement[:3, :3].T + placement[:3, 3])
 
 
@@ -73,7 +72,7 @@ def _of_bar(open_legs: Legs, legs: Legs, place: Place, bar: Bar, mass: float, at
     near = walk(legs, leg, actuators, legs.home_passive[None], Twists(legs)).place[0]
     far = way.place[0] + way.turn[0] @ bar.platform_mm
     line = (far - near) / np.linalg.norm(far - near)
-    spots = _moved(_behind(open_legs, chain, way, place.joint), at)
+    spots = _transformed(_behind(open_legs, chain, way, place.joint), at)
     slides = [k for k, joint in enumerate(chain.joints) if joint.kind == "P" and k >= len(leg.joints) - 1]
     moving = bool(slides) and place.joint >= slides[0]
     middle = spots.mean(axis=0)
@@ -85,7 +84,7 @@ def _of_bar(open_legs: Legs, legs: Legs, place: Place, bar: Bar, mass: float, at
 
 
 def _behind(legs: Legs, chain: Leg, way: Walk, number: int) -> np.ndarray:
-    """Placement behind the motion of a joint of a chain in the home pose, way: its Walk."""
+    """Placement of the link that a joint of a chain moves, in the home pose; way: the chain's Walk."""
     joint, turn, place = chain.joints[number], way.turns[number][0], way.places[number][0]
     value = joint.home if joint.drive is None else legs.driven(legs.home_drives)[joint.drive]
     if joint.kind == "P":

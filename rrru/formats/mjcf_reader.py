@@ -1,9 +1,10 @@
 """The bodies of a MuJoCo model as rigid parts, and the joint graph of these, for `rrru.formats.robot_file`.
 
-Bodies without a joint and welded ones make one part. Seams join parts: the joints between a body and its parent, and
-the connects between two parts, where one is a ball joint and two are a hinge. A leg is a path of seams from the base to
-the platform. Values of joints count from the file's reference configuration (MuJoCo's qpos less ref); those of ball
-joints, three turns about x, y and z, from the home pose. Lengths in mm, angles in rad; placements are (4, 4).
+A body without a joint belongs to the part of its parent, a welded body to that of its partner. A seam joins two parts:
+the joints between a body and its parent, or the connects between two parts. One connect is a ball joint, two are a
+hinge. A leg is a path of seams from the base to the platform. Values of joints count from the file's reference
+configuration (MuJoCo's qpos less ref); those of ball joints, three turns about x, y and z, from the home pose. Lengths
+in mm, angles in rad; placements are (4, 4).
 """
 
 from collections.abc import Sequence
@@ -21,8 +22,8 @@ MM = 1000.0
 # the name of the measured point in a file, where it has moved
 MEASURED_TOOL = "measured_tool"
 _EQ, _JOINT = mujoco.mjtEq, mujoco.mjtJoint
-# two joints are on one line within this, in m and rad
-_SAME = 1e-9
+# two joints are on one line if they are off it by less than this, in m and rad
+_MAX_OFF_LINE = 1e-9
 
 
 def backlash_joints(model: mujoco.MjModel) -> dict[int, int]:
@@ -48,7 +49,7 @@ def _on_one_line(model: mujoco.MjModel, joint: int, other: int) -> bool:
     axis, apart = model.jnt_axis[other], model.jnt_pos[joint] - model.jnt_pos[other]
     slides = model.jnt_type[joint] == _JOINT.mjJNT_SLIDE
     off = 0.0 if slides else np.linalg.norm(np.cross(axis, apart))
-    return bool(np.linalg.norm(np.cross(axis, model.jnt_axis[joint])) < _SAME and off < _SAME)
+    return bool(np.linalg.norm(np.cross(axis, model.jnt_axis[joint])) < _MAX_OFF_LINE and off < _MAX_OFF_LINE)
 
 
 def ends_of(model: mujoco.MjModel, k: int) -> tuple[int, np.ndarray, int, np.ndarray]:
@@ -99,7 +100,7 @@ class Assembly:
         return self.model.body(body).name or f"body {body}"
 
     def joint_name(self, joint: int) -> str:
-        """Name of a joint, if it has none from its body's."""
+        """Name of a joint, made from its body's where the file gives none."""
         body = int(self.model.jnt_bodyid[joint])
         number = joint - int(self.model.body_jntadr[body]) + 1
         return self.model.joint(joint).name or f"{self.body_name(body)} joint {number}"
@@ -113,7 +114,7 @@ class Assembly:
         return placed(MM * self.data.xpos[body], self.data.xmat[body].reshape(3, 3))
 
     def own(self, body: int) -> np.ndarray:
-        """Placement of a body in its parent's, joints at zero."""
+        """Placement of a body in its parent's frame with all joints at zero."""
         return placed(MM * self.model.body_pos[body], turn_of(self.model.body_quat[body]))
 
     def _frames(self, welds: Sequence[int]) -> dict[int, tuple[int, np.ndarray]]:
@@ -230,7 +231,7 @@ class Assembly:
         return tuple(dict.fromkeys(item.origin for item in items if isinstance(item, Move)))
 
     def _closes(self, number: int) -> bool:
-        """Whether a seam is one of connects."""
+        """Whether a seam consists of connects."""
         return all(move.joint is None for move in self.seams[number].items if isinstance(move, Move))
 
     def _ball_items(

@@ -9,8 +9,8 @@ from rrru.diagnosis.number_text import rounded, with_interval
 from rrru.estimation.intervals import QUANTILE_95
 from rrru.report.cells import MINUS
 
-# correlation from which two parameters are not separable
-_TOGETHER = 0.95
+# absolute correlation above which two parameters are not separable
+_MIN_INSEPARABLE_CORRELATION = 0.95
 _NO_EFFECTS = ("none", "unexplained")
 COLUMNS = ["campaign", "parameter", "value", "judgement", "with_effects", "true_value", "calibration", "points"]
 
@@ -38,7 +38,7 @@ def trust(
     rows = rows.assign(unexplained=rows["campaign"].map(answers).fillna("").str.contains("unexplained"))
     said: dict[str, Callable[[Mapping[str, Any]], str | None]] = {
         "value": _value,
-        "judgement": lambda row: _judged(row, _tied(row, correlations)),
+        "judgement": lambda row: _judgement(row, _inseparable(row, correlations)),
         "with_effects": lambda row: _interval(row["moved"], row["low_95"], row["high_95"], row["unit"]),
         "true_value": lambda row: _plain(row["true_value"], row["unit"]),
     }
@@ -57,14 +57,14 @@ def _value(row: Mapping[str, Any]) -> str | None:
 
 
 def _interval(value: float, low: float, high: float, unit: str) -> str | None:
-    """A number with its unit and its 95 % interval, without one where there is none."""
+    """A number with its unit and its 95 % interval; the number alone where the interval is NaN or empty."""
     if not high > low:
         return _plain(value, unit)
     return str(with_interval(value, low, high, unit).replace("-", MINUS))
 
 
-def _judged(row: Mapping[str, Any], tied: Sequence[str]) -> str:
-    """What a user may do with one number; tied: parameters that the points see only together with it."""
+def _judgement(row: Mapping[str, Any], tied: Sequence[str]) -> str:
+    """What a user may do with one number; tied: parameters that the points do not separate from it."""
     half = QUANTILE_95 * row["standard_error"]
     if not row["seen"]:
         return "do not use: the points do not show it"
@@ -76,16 +76,16 @@ def _judged(row: Mapping[str, Any], tied: Sequence[str]) -> str:
         return "doubtful: something acts that no effect explains"
     if tied:
         return f"use only together with {', '.join(tied)}"
-    # the interval of the model with the effects, where there is one: without these it holds what they make
+    # the interval with the effects in the model, where there is one: without them the parameter absorbs the effects
     low, high = row["value"] - half, row["value"] + half
     if row["high_95"] > row["low_95"]:
         low, high = row["low_95"], row["high_95"]
     return "use: differs from the drawing" if low > 0.0 or high < 0.0 else "use: as drawn, within its error"
 
 
-def _tied(row: Mapping[str, Any], correlations: pd.DataFrame) -> list[str]:
-    """Parameters whose estimates nearly rise and fall with this one's."""
+def _inseparable(row: Mapping[str, Any], correlations: pd.DataFrame) -> list[str]:
+    """Parameters whose estimates correlate so strongly with this one's that the points do not separate them."""
     of_row = (correlations["campaign"] == row["campaign"]) & (correlations["calibration"] == row["calibration"])
-    strong = correlations[of_row & (correlations["correlation"].abs() > _TOGETHER)]
+    strong = correlations[of_row & (correlations["correlation"].abs() > _MIN_INSEPARABLE_CORRELATION)]
     pairs = zip(strong["parameter_a"], strong["parameter_b"], strict=True)
     return sorted({name for pair in pairs if row["parameter"] in pair for name in pair} - {row["parameter"]})

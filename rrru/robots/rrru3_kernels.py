@@ -10,7 +10,7 @@ import numpy as np
 from rrru.arrays import FloatArray
 from rrru.kinematics.typed_numba import njit
 
-# A Newton step of this size (mm^2, squared) leaves an error far below 1e-9 mm, since convergence is quadratic with a
+# A Newton step of this squared length in mm^2 leaves an error far below 1e-9 mm: convergence is quadratic with a
 # constant of about 1 / (link length): (1e-4)^2 / 100 = 1e-10.
 _LAST_STEP_SQUARED = 1e-8
 _MOST_STEPS = 25
@@ -56,7 +56,7 @@ def _newton_step(
 # not contracted: a square that is rounded by itself gives the same bits wherever the legs come from
 @njit(cache=True, error_model="numpy")
 def _leg(legs: FloatArray, turn: FloatArray, k: int) -> _Leg:
-    """Numbers of one leg that stay over the points: azimuth and drive as cosines and sines, lengths."""
+    """Numbers of one leg that are the same at all points: cosines and sines of azimuth and drive offset, lengths."""
     angle, forearm = legs[k, 0], legs[k, 3]
     lengths = legs[k, 1], legs[k, 2], forearm * forearm, legs[k, 4]
     return turn[0, k], turn[1, k], np.cos(angle), np.sin(angle), lengths
@@ -91,7 +91,7 @@ def _solve(
         _newton_step(legs, turn, cosine, sine, position, step_squared)
         converged = iteration > 0
         for j in range(n):
-            # a NaN has left the reach and stays NaN; it must not keep the others iterating
+            # NaN is a point out of reach and stays NaN: it must not keep the others iterating
             if step_squared[j] > _LAST_STEP_SQUARED:
                 converged = False
         if converged:

@@ -1,7 +1,7 @@
 """Drives a changed MJCF: from stop to stop at rest, or in time where a cause acts in motion only. SI units inside.
 
 The path between two stops is driven, never jumped, with a smooth start and end, so that backlash and friction keep
-their states. At each point the robot is at rest and its loops are closed, or an error states how far they are not.
+their states. At each point the robot is at rest and its loops are closed; otherwise an error states speed or opening.
 Geometric errors, constant and by warming up, move the seats of bodies and of sites.
 """
 
@@ -18,18 +18,23 @@ from rrru.effects.protocol import Motion
 from rrru.errors import SimulationError, UnreachableError
 from rrru.simulation.mujoco_model import MM, PAYLOAD, STEP_S, Edit
 
-# a recorded point's loops are open by less, and its platform is slower, angles counted at an arm of half a metre: a
-# body held by friction creeps in MuJoCo by some um/s
+# limits at a recorded point: opening of its loops, and speed of its platform, the angular one times a characteristic
+# length. A body held by friction creeps in MuJoCo by some um/s
 CLOSED_MM, REST_MM_S = 1e-3, 1e-2
-_ARM = 0.5
+_CHARACTERISTIC_LENGTH_M = 0.5
 # the platform is accelerated by a tenth of gravity at most, so that holding friction still holds an arm in its backlash
-_ACCELERATION = 1.0
-_ASSEMBLY_STEPS, _BLOCKS, _MOST_BLOCKS = 2500, (37, 50), 400
+_MAX_ACCELERATION_M_S2 = 1.0
+_ASSEMBLY_STEPS, _BLOCK_STEPS, _MAX_BLOCKS = 2500, (37, 50), 400
 # peak acceleration of the smooth step 10 s^3 - 15 s^4 + 6 s^5
-_PEAK = 10.0 / np.sqrt(3.0)
-_SHORTEST_S = 0.02
+_PEAK_ACCELERATION = 10.0 / np.sqrt(3.0)
+_MIN_MOVE_S = 0.02
 _WARNING = mujoco.mjtWarning
-_BURST = (_WARNING.mjWARN_BADQPOS, _WARNING.mjWARN_BADQVEL, _WARNING.mjWARN_BADQACC, _WARNING.mjWARN_BADCTRL)
+_INSTABILITY_WARNINGS = (
+    _WARNING.mjWARN_BADQPOS,
+    _WARNING.mjWARN_BADQVEL,
+    _WARNING.mjWARN_BADQACC,
+    _WARNING.mjWARN_BADCTRL,
+)
 
 
 class Machine:
@@ -42,7 +47,7 @@ class Machine:
             model.body(edit.prefix + name).mass += kilograms
         self.shape = Shape(edit, model)
         self.shape.write(0.0, 0.0)
-        self._weigh(0.0)
+        self._set_payload(0.0)
         self._damp_added()
         self.platform = model.body(edit.prefix + edit.platform).id
         self.actuators = np.array([model.actuator(edit.prefix + name).id for name in edit.servos.values()])
@@ -50,8 +55,8 @@ class Machine:
         # a servo sees the position at the beginning of a step and the control of its end
         self.known_lag_s = kv / kp - STEP_S - [edit.lags.get(joint, 0.0) for joint in edit.servos]
 
-    def _weigh(self, payload_kg: float) -> None:
-        """Hang a payload on the platform."""
+    def _set_payload(self, payload_kg: float) -> None:
+        """Set the mass of the payload on the platform."""
         self.model.body(self.edit.prefix + PAYLOAD).mass = payload_kg
         mujoco.mj_setConst(self.model, mujoco.MjData(self.model))
         self._balance_leashes()
@@ -113,30 +118,30 @@ class Machine:
         Raises SimulationError where the robot is not at rest or its loops are not closed.
         """
         path, index, payload = self.controls(motion.path_drive), motion.path_index, np.nan_to_num(motion.payload_kg)
-        way, time_s = _Way(path, motion, self.known_lag_s), motion.time_s
+        way, time_s = _ControlPath(path, motion, self.known_lag_s), motion.time_s
         self._assemble(path[0], payload[0])
-        self._send(way.at_ease(0, index[0]))
+        self._send(way.slowly(0, index[0]))
         positions, turns = [], []
         for point in range(len(index)):
             on_time = moving and point and way.moves(point)
             if point:
                 if payload[point] != payload[point - 1]:
-                    self._weigh(payload[point])
+                    self._set_payload(payload[point])
                 self.shape.write(1.0, time_s[point])
                 before, here = index[point - 1 : point + 1]
-                self._send(way.in_time(point) if on_time else way.at_ease(before, here, way.far[point]))
+                self._send(way.in_time(point) if on_time else way.slowly(before, here, way.far[point]))
             where = f"point {point + 1} of {len(index)}"
             if not on_time or not way.moving[point]:
-                self._rest(where)
+                self._wait_for_rest(where)
             mujoco.mj_fwdPosition(self.model, self.data)
-            self._closed(where)
+            self._require_closed(where)
             positions.append(MM * self.data.xpos[self.platform])
             turns.append(self.data.xmat[self.platform].reshape(3, 3).copy())
         return np.array(positions), np.array(turns)
 
     def _assemble(self, controls: FloatArray, payload_kg: float) -> None:
         """Bring the robot from home to its first controls, with weight and errors growing from zero."""
-        self._weigh(payload_kg)
+        self._set_payload(payload_kg)
         home = np.concatenate([self.edit.home[joint] for joint in self.edit.servos])
         full = np.array(self.model.opt.gravity)
         for share in _smooth(_ASSEMBLY_STEPS):
@@ -151,36 +156,36 @@ class Machine:
             data.ctrl[self.actuators] = row
             mujoco.mj_step(model, data)
 
-    def _rest(self, where: str) -> None:
+    def _wait_for_rest(self, where: str) -> None:
         """Wait until the platform is at rest twice in a row."""
         calm = 0
-        for block in range(_MOST_BLOCKS):
-            mujoco.mj_step(self.model, self.data, nstep=_BLOCKS[block % 2])
+        for block in range(_MAX_BLOCKS):
+            mujoco.mj_step(self.model, self.data, nstep=_BLOCK_STEPS[block % 2])
             velocity = np.zeros(6)
             mujoco.mj_objectVelocity(self.model, self.data, mujoco.mjtObj.mjOBJ_XBODY, self.platform, velocity, 0)
-            speed = MM * max(_ARM * np.linalg.norm(velocity[:3]), np.linalg.norm(velocity[3:]))
+            speed = MM * max(_CHARACTERISTIC_LENGTH_M * np.linalg.norm(velocity[:3]), np.linalg.norm(velocity[3:]))
             calm = calm + 1 if speed < REST_MM_S else 0
-            if calm == len(_BLOCKS):
+            if calm == len(_BLOCK_STEPS):
                 return
-        self._unburst(where)
-        waited = f"still moves at {speed:.3g} mm/s after {STEP_S * _MOST_BLOCKS * np.mean(_BLOCKS):.1f} s"
+        self._require_stable(where)
+        waited = f"still moves at {speed:.3g} mm/s after {STEP_S * _MAX_BLOCKS * np.mean(_BLOCK_STEPS):.1f} s"
         raise SimulationError(f"{self.file}: {where} {waited}; allowed: less than {REST_MM_S:g}")
 
-    def _closed(self, where: str) -> None:
+    def _require_closed(self, where: str) -> None:
         """Raise SimulationError where loops are open."""
-        self._unburst(where)
+        self._require_stable(where)
         data = self.data
         open_mm = MM * np.abs(data.efc_pos[: data.ne]).max(initial=0.0)
         if not open_mm < CLOSED_MM:
             raise SimulationError(f"{self.file}: {where}: loops are open by {open_mm:.3g} mm; allowed: {CLOSED_MM:g}")
 
-    def _unburst(self, where: str) -> None:
+    def _require_stable(self, where: str) -> None:
         """Raise SimulationError where the simulation has become unstable, after which MuJoCo resets it."""
-        if any(self.data.warning[int(kind)].number for kind in _BURST):
+        if any(self.data.warning[int(kind)].number for kind in _INSTABILITY_WARNINGS):
             raise SimulationError(f"{self.file}: {where}: the simulation has become unstable; allowed: softer causes")
 
 
-class _Way:
+class _ControlPath:
     """Controls along a path (N, K) with points at rows (n,), those of a Motion."""
 
     def __init__(self, path: FloatArray, motion: Motion, known_lag_s: FloatArray) -> None:
@@ -196,12 +201,12 @@ class _Way:
         """Whether the drives move at a point or the one before."""
         return bool(self.moving[point - 1] or self.moving[point])
 
-    def at_ease(self, first: int, last: int, far: float = 0.0) -> FloatArray:
+    def slowly(self, first: int, last: int, far: float = 0.0) -> FloatArray:
         """Controls (m, K) from row to row of the path, at least so far in m, with a smooth start and end."""
         rows = np.arange(len(self.path))
         turned = np.abs(np.diff(self.path[first : last + 1], axis=0)).max(axis=1, initial=0.0).sum()
-        seconds = np.sqrt(_PEAK * max(far, _ARM * turned) / _ACCELERATION)
-        at = first + (last - first) * _smooth(round(max(seconds, _SHORTEST_S) / STEP_S))
+        seconds = np.sqrt(_PEAK_ACCELERATION * max(far, _CHARACTERISTIC_LENGTH_M * turned) / _MAX_ACCELERATION_M_S2)
+        at = first + (last - first) * _smooth(round(max(seconds, _MIN_MOVE_S) / STEP_S))
         return np.stack([np.interp(at, rows, drive) for drive in self.path.T], axis=1)
 
     def in_time(self, point: int) -> FloatArray:

@@ -49,8 +49,8 @@ class VirtualRobot(DrivenRobot):
     def motion(self, plan: Plan, controller: Controller) -> Motion:
         """The Motion of a plan, input of the effects; the loads are those at the true pose, with errors and deflection.
 
-        For a platform that cannot turn they are those at the commanded positions: there a millimetre changes them by a
-        share of a percent, for others by several percent.
+        For a platform that cannot rotate they are those at the commanded positions: a millimetre changes them by less
+        than a percent. For other platforms it changes them by several percent.
         """
         course = self.course(plan, controller)
         motion, sent = make_motion(self.mechanism, self.masses, course), (course.drive, course.position_mm)

@@ -32,10 +32,10 @@ _SIGNATURES = (
 _UTF16 = (b"\xff\xfe", b"\xfe\xff")
 _TEXT = "comma-separated text in UTF-8 with decimal points and one header line"
 _OTHER_ENCODING = f"{_TEXT}; save the file again with the encoding UTF-8"
-_TWO_FIELDS = "; a decimal comma makes two fields of one number"
+_DECIMAL_COMMA_HINT = "; a decimal comma makes two fields of one number"
 
 _BROKEN = (BadZipFile, ParseError, ZlibError, OSError, EOFError)
-# what openpyxl raises where a part of a workbook is not what another part says
+# what openpyxl raises where parts of a workbook contradict each other
 _INCONSISTENT = (KeyError, ValueError, TypeError, AttributeError, IndexError, AssertionError, NotImplementedError)
 
 
@@ -47,10 +47,10 @@ Cell: TypeAlias = str | float | int | bool | Decimal | date | time | None
 class Cells:
     """Cells of a file: names of its columns, numbers of its n rows as an editor shows them, {name: cells (n,)}.
 
-    means: our names of columns that the format knows, to the file's; factors: what brings columns to mm whose unit the
-    file states; spreads: what makes a standard deviation of expanded uncertainties; commas: columns with decimal
-    commas; unused: columns that the format knows and nothing needs; added: columns that the file does not have; notes:
-    what the user should know.
+    means: our name to the file's name of the columns that the format defines; factors: by column from the unit that the
+    file states to mm; spreads: by column from expanded uncertainty to standard deviation; commas: columns with decimal
+    commas; unused: columns that the format defines and nothing needs; added: columns that the file does not have;
+    notes: what the user should know.
     """
 
     names: list[str]
@@ -66,7 +66,7 @@ class Cells:
 
 
 def read_bytes(path: Path, problems: Problems) -> bytes:
-    """All of a file, or its refusal."""
+    """The bytes of a file; raises IngestError where it cannot be read."""
     try:
         if not path.exists():
             problems.refuse_now(value="no such file", allowed="an existing file of measurements")
@@ -79,12 +79,12 @@ def read_bytes(path: Path, problems: Problems) -> bytes:
 
 
 def looks_like(data: bytes) -> str | None:
-    """Name of the file format that the first bytes give away, or None."""
+    """Name of the file format that the first bytes identify, or None."""
     return next((name for signature, name in _SIGNATURES if data.startswith(signature)), None)
 
 
-def _contents(data: bytes) -> str:
-    """What a file holds that has not the format that it should have."""
+def _actual_format(data: bytes) -> str:
+    """What a file holds that is not of the expected format, in words."""
     return looks_like(data) or (f"text or other data ({data[:30]!r})" if data else "an empty file")
 
 
@@ -130,7 +130,7 @@ def table(
         value = f"a header ({', '.join(names)}) and no row"
         problems.refuse_now(value=value, allowed="one row per measured point below the header")
     numbered = zip(numbers, rows, strict=False)
-    complete = [(number, row) for number, row in numbered if _is_whole(number, row, len(names), problems)]
+    complete = [(number, row) for number, row in numbered if _is_complete(number, row, len(names), problems)]
     if not complete:
         problems.refuse()
     columns = zip(*(row for _, row in complete), strict=True)
@@ -173,7 +173,7 @@ def separator_of(lines: Sequence[str], decimal: str = ".") -> str:
 
 
 def declared(separator: str, text: str) -> str:
-    """Text: what to write into the configuration for a separator other than a comma."""
+    """The line of the configuration that states a separator other than a comma."""
     decimal = ', decimal: ","' if separator != "," and re.search(r"\d,\d", text) else ""
     return f"format: {{kind: csv, separator: {json.dumps(separator)}{decimal}}}"
 
@@ -192,7 +192,7 @@ def _require_header(names: list[str], rows: Sequence[Sequence[str]], separator: 
         problems.refuse_now(value=f"a first line of values ({', '.join(names)})", allowed=allowed)
     if len(set(widths)) == 1 and widths[0] != len(names):
         value = f"a first line of {len(names)} fields ({', '.join(names[:5])}, ...) above rows of {widths[0]} fields"
-        problems.refuse_now(value=value, allowed=allowed + _TWO_FIELDS)
+        problems.refuse_now(value=value, allowed=allowed + _DECIMAL_COMMA_HINT)
 
 
 def _is_number(text: str) -> bool:
@@ -209,14 +209,14 @@ def _filled(cell: Cell) -> bool:
     return cell is not None and cell != ""
 
 
-def _is_whole(number: int, row: Sequence[Cell], width: int, problems: Problems) -> bool:
+def _is_complete(number: int, row: Sequence[Cell], width: int, problems: Problems) -> bool:
     """Whether a row has as many fields as the header; others, and empty ones, are noted."""
     filled = any(map(_filled, row))
     if not filled:
         allowed = "one row per measured point: drop the row"
         problems.add("empty row", row=number, value="an empty row", allowed=allowed)
     elif len(row) != width:
-        allowed = f"{width} fields as in the header{_TWO_FIELDS if len(row) > width else ''}"
+        allowed = f"{width} fields as in the header{_DECIMAL_COMMA_HINT if len(row) > width else ''}"
         shown = ", ".join(map(str, row[:4]))
         problems.add("ragged row", row=number, value=f"{len(row)} fields ({shown}, ...)", allowed=allowed)
     return filled and len(row) == width
@@ -229,7 +229,7 @@ def parquet_cells(data: bytes, problems: Problems) -> Cells:
 
     if not data.startswith(b"PAR1"):
         allowed = "a parquet file; comma-separated text has the extension .csv"
-        problems.refuse_now(value=_contents(data), allowed=allowed)
+        problems.refuse_now(value=_actual_format(data), allowed=allowed)
     try:
         frame = pyarrow.parquet.ParquetFile(pyarrow.BufferReader(data)).read()
         names = [name for name in frame.column_names if not re.fullmatch(r"__index_level_\d+__", name)]
@@ -250,7 +250,7 @@ def xlsx_cells(data: bytes, problems: Problems, sheet: str | None = None) -> Cel
     from openpyxl.utils.exceptions import InvalidFileException
 
     if not data.startswith(b"PK\x03\x04"):
-        problems.refuse_now(value=_contents(data), allowed="an .xlsx workbook")
+        problems.refuse_now(value=_actual_format(data), allowed="an .xlsx workbook")
     try:
         with warnings.catch_warnings(action="ignore"):
             book = load_workbook(io.BytesIO(data), data_only=True)

@@ -28,26 +28,26 @@ from rrru.kinematics.robot import Robot
 EXPLAINED_SHARE = 5e-3
 # a smaller rms, as a share of the robot's size, is one of ordinary errors of its geometry; assumed
 ORDINARY_SHARE = 2e-3
-# rows that decide: enough for the rms of every hypothesis within some percent; and rows that screen the hypotheses
-_MOST_ROWS, _MOST_SCREENED = 120, 40
+# number of rows that decide: they give the rms of every hypothesis within some percent; number that screens them
+_MAX_ROWS, _MAX_SCREENED_ROWS = 120, 40
 # share of the rows at which the nominal robot has to have a pose for a hypothesis to count
-_LEAST_POSED = 0.9
-# readings farther off than so many medians are spoilt, and do not count
-_SPOILT = 6.0
-# independent errors of a robot whose model has few parameters: its joints have more; assumed
-_LEAST_INDEPENDENT = 15
-# a target that is nearer to its stated place than the first share of the robot's size is not grossly wrong, one that
-# is farther than the second cannot be; assumed
-_NEAREST_SHARE, _FARTHEST_SHARE = 0.01, 0.5
-# a residual of less than this share of the positions' spread is as good as none: no hypothesis wins by rounding
-_NO_RESIDUAL_SHARE = 1e-5
+_MIN_POSED_SHARE = 0.9
+# readings whose residual exceeds this multiple of the median are outliers and do not count
+_MAX_PER_MEDIAN = 6.0
+# least number of independent errors, for robots whose model has fewer parameters than their joints have; assumed
+_MIN_INDEPENDENT_ERRORS = 15
+# a place of a target that is off by less than the first share of the robot's size is not a gross error; one that is
+# off by more than the second is impossible; assumed
+_MIN_TARGET_SHIFT_SHARE, _MAX_TARGET_SHIFT_SHARE = 0.01, 0.5
+# smaller residuals, as a share of the positions' spread, count as this: no hypothesis wins by rounding
+_MIN_RESIDUAL_SHARE = 1e-5
 # positions spread over more than the first share of the robot's size, and over less than the second, or the unit of
 # its drives is wrong
-_LEAST_SPREAD, _MOST_SPREAD = 2e-3, 3.0
-# distance of commanded positions that agree with drive values of few digits
-_AGREED_MM = 1.0
-# turns, or sizes of the robot, by which drives may be away from their home values: with more the unit is another
-_MOST_AWAY = 4.0
+_MIN_SPREAD_SHARE, _MAX_SPREAD_SHARE = 2e-3, 3.0
+# median distance up to which commanded positions and drive values of few digits agree
+_MAX_COMMAND_DISTANCE_MM = 1.0
+# turns, or sizes of the robot, by which drives may differ from their home values: beyond, their unit is wrong
+_MAX_FROM_HOME = 4.0
 
 
 @dataclass(frozen=True)
@@ -114,11 +114,11 @@ class GrossFile:
         right &= ~np.isin(names, spec.world_targets)
         if command is not None and not driven:
             right &= np.isfinite(command).all(axis=1)
-        chosen = _some(np.flatnonzero(right), _MOST_ROWS)
+        chosen = _drawn_rows(np.flatnonzero(right), _MAX_ROWS)
         turn = rows.turns(frame, "command") if set(TURNS["command"]) <= set(frame) else None
         turn = np.broadcast_to(robot.legs.home_turn, (len(frame), 3, 3)) if turn is None else turn
         place = _places(frame, spec, robot, known, number)
-        read = rows.measured(frame), _labels(frame), number, tuple(known.tolist()), place
+        read = rows.measured(frame), _run_numbers(frame), number, tuple(known.tolist()), place
         if command is not None and not driven and not _moves(command[chosen], robot):
             return None
         return cls(robot, spec, found, unit_stated, drive, command, turn, *read, chosen)
@@ -171,12 +171,12 @@ class GrossFile:
     def evidence_at_most(self, mistakes: Mistakes) -> float:
         """Upper bound of the log evidence of some Mistakes, from fewer rows."""
         at = self._rows(mistakes.shift)
-        readings = self.readings(mistakes, at[:: max(len(at) // _MOST_SCREENED, 1)])
+        readings = self.readings(mistakes, at[:: max(len(at) // _MAX_SCREENED_ROWS, 1)])
         share = 1.0 if readings is None else affine_rms(readings) / self._spread(readings)
         return self._log_evidence(mistakes, share, len(at))
 
     def hypothesis(self, mistakes: Mistakes) -> Hypothesis:
-        """The Hypothesis of some mistakes; its rms is infinite where the nominal robot has no poses then."""
+        """The Hypothesis of some mistakes; its rms is infinite where the nominal robot has too few poses then."""
         impossible = Hypothesis(mistakes, np.inf, self.place_mm, np.eye(3), self._log_evidence(mistakes, 1.0, 1))
         readings = self.readings(mistakes)
         if readings is None:
@@ -188,9 +188,9 @@ class GrossFile:
         place = self._near_stated(found.place_mm, readings.body_turn) if mistakes.free else found.place_mm
         moved = np.linalg.norm((place - self.place_mm)[self._stated], axis=1).max(initial=0.0)
         size = self.robot.size_mm
-        if mistakes.free and not _NEAREST_SHARE * size < moved < _FARTHEST_SHARE * size:
+        if mistakes.free and not _MIN_TARGET_SHIFT_SHARE * size < moved < _MAX_TARGET_SHIFT_SHARE * size:
             return impossible
-        rms = _usual_rms(np.linalg.norm(found.residual_mm, axis=1), readings.target)
+        rms = _rms_without_outliers(np.linalg.norm(found.residual_mm, axis=1), readings.target)
         # the smaller spread of readings and poses, so that no hypothesis is favoured for making one of them small
         share = rms / min(self._spread(readings), _spread(readings.measured_mm))
         return Hypothesis(
@@ -232,7 +232,7 @@ class GrossFile:
         return np.asarray(np.isfinite(self.place_mm).all(axis=1))
 
     @cached_property
-    def _ways(self) -> int:
+    def _mistake_count(self) -> int:
         """Number of single mistakes."""
         return len([*self.given.further(self.units, self.shifts)])
 
@@ -243,11 +243,11 @@ class GrossFile:
 
     def _log_evidence(self, mistakes: Mistakes, share: float, count: int) -> float:
         """Log evidence of an rms in shares of the positions' spread, from `count` rows."""
-        independent = min(max(len(self.robot.parameters), _LEAST_INDEPENDENT), 3 * len(self) // 2)
+        independent = min(max(len(self.robot.parameters), _MIN_INDEPENDENT_ERRORS), 3 * len(self) // 2)
         fitted = 3 * np.isin(np.flatnonzero(self._stated), self.target[self.chosen]).sum() * mistakes.free
         cost = 0.5 * fitted * np.log(3.0 * max(count, 1))
-        share = min(max(share, _NO_RESIDUAL_SHARE), 1.0)
-        return float(mistakes.log_prior(self._ways) - independent * np.log(share) - cost)
+        share = min(max(share, _MIN_RESIDUAL_SHARE), 1.0)
+        return float(mistakes.log_prior(self._mistake_count) - independent * np.log(share) - cost)
 
     def readings(self, mistakes: Mistakes, at: np.ndarray | None = None) -> TargetReadings | None:
         """The TargetReadings of some rows (m,), by default of all that decide.
@@ -260,16 +260,16 @@ class GrossFile:
         body, turn = self._bodies(mistakes, at)
         if self.agreed and self.command_mm is not None and not mistakes.of_readings:
             off = np.linalg.norm(body + turn @ np.asarray(self.robot.tool_mm) - self.command_mm[at], axis=1)
-            if not np.median(off) <= _AGREED_MM:
+            if not np.median(off) <= _MAX_COMMAND_DISTANCE_MM:
                 return None
         posed = np.isfinite(body).all(axis=1)
-        if posed.mean() < _LEAST_POSED:
+        if posed.mean() < _MIN_POSED_SHARE:
             return None
         at, body, turn = at[posed], body[posed], turn[posed]
         place = np.full_like(self.place_mm, np.nan) if mistakes.free else self.place_mm
         seen = self.measured_mm[at + mistakes.shift] * _factor(MM, mistakes.unit, self.spec.unit)
         readings = TargetReadings(body, turn, seen, self.target[at], place, self.robot.tool_mm)
-        moves = _LEAST_SPREAD < self._spread(readings) / self.robot.size_mm < _MOST_SPREAD
+        moves = _MIN_SPREAD_SHARE < self._spread(readings) / self.robot.size_mm < _MAX_SPREAD_SHARE
         return readings if moves else None
 
     def off_in_robot_frame(self, mistakes: Mistakes) -> float:
@@ -299,7 +299,7 @@ class GrossFile:
         factor = np.where(lengths, length, _factor(RAD, mistakes.angle_unit, self.spec.angle_unit))
         values = mistakes.applied(self.drive[at]) * factor
         away = np.abs(values - self.robot.legs.home_drives) / np.where(lengths, self.robot.size_mm, 2.0 * np.pi)
-        if np.median(away.max(axis=1)) > _MOST_AWAY or not (mistakes == self.given or self._in_range(values)):
+        if np.median(away.max(axis=1)) > _MAX_FROM_HOME or not (mistakes == self.given or self._in_range(values)):
             return np.full((len(at), 3), np.nan), np.zeros((len(at), 3, 3))
         # poses that do not exist are expected here
         with np.errstate(all="ignore"):
@@ -327,7 +327,7 @@ class GrossFile:
         )
 
     def _rows(self, shift: int) -> np.ndarray:
-        """Rows (m,) that have measured values, so many rows on, of the same run."""
+        """Deciding rows (m,) for which the row `shift` later is of the same run and has measured values."""
         if not shift:
             return self.chosen
         there = self.chosen + shift
@@ -343,14 +343,14 @@ def _closed(poses: Poses) -> tuple[np.ndarray, np.ndarray]:
     )
 
 
-def _some(at: np.ndarray, most: int) -> np.ndarray:
-    """At most so many of some rows (n,), in their order."""
+def _drawn_rows(at: np.ndarray, most: int) -> np.ndarray:
+    """At most `most` of some rows (n,), drawn at random and in their order."""
     return at if len(at) <= most else np.sort(np.random.default_rng(0).choice(at, most, replace=False))
 
 
 def _moves(position: np.ndarray, robot: Robot) -> bool:
     """Whether positions (n, 3) spread as far as those of a robot do."""
-    return len(position) > 1 and _LEAST_SPREAD < _spread(position) / robot.size_mm < _MOST_SPREAD
+    return len(position) > 1 and _MIN_SPREAD_SHARE < _spread(position) / robot.size_mm < _MAX_SPREAD_SHARE
 
 
 def _places(frame: pd.DataFrame, spec: IngestSpec, robot: Robot, names: np.ndarray, number: np.ndarray) -> np.ndarray:
@@ -366,8 +366,8 @@ def _places(frame: pd.DataFrame, spec: IngestSpec, robot: Robot, names: np.ndarr
     return np.array([stated.get(name, (np.nan,) * 3) for name in names.tolist()], dtype=float)
 
 
-def _labels(frame: pd.DataFrame) -> np.ndarray:
-    """Number (n,) of each row's run of one trajectory."""
+def _run_numbers(frame: pd.DataFrame) -> np.ndarray:
+    """Number (n,) of each row's pass along a trajectory."""
     run = frame["run"].to_numpy(dtype=float) if "run" in frame else np.zeros(len(frame))
     path = frame["trajectory"] if "trajectory" in frame else np.full(len(frame), "")
     pairs = pd.DataFrame({"run": np.nan_to_num(run), "trajectory": np.asarray(path)})
@@ -375,15 +375,15 @@ def _labels(frame: pd.DataFrame) -> np.ndarray:
 
 
 def _factor(units: Mapping[str, float], right: str | None, stated: str) -> float:
-    """Factor from the stated unit, in which numbers were read, to the right one, if that is another."""
+    """Factor from the stated unit, in which numbers were read, to the right one; None: the stated one is right."""
     return units[right or stated] / units[stated]
 
 
-def _usual_rms(off: np.ndarray, target: np.ndarray) -> float:
-    """Rms of distances (n,) without spoilt readings, which are far off compared with others of their target (n,)."""
+def _rms_without_outliers(off: np.ndarray, target: np.ndarray) -> float:
+    """Rms of distances (n,) without outliers, which are large compared with the median of their target (n,)."""
     _, number = np.unique(target, return_inverse=True)
     medians = np.array([np.median(off[number == k]) for k in range(number.max() + 1)])
-    return float(np.sqrt((off[off <= _SPOILT * medians[number]] ** 2).mean()))
+    return float(np.sqrt((off[off <= _MAX_PER_MEDIAN * medians[number]] ** 2).mean()))
 
 
 def _spread(position: np.ndarray) -> float:

@@ -8,7 +8,7 @@ from typing import NoReturn
 from rrru.errors import IngestError, Problem
 
 LISTED = 20
-_LENGTH = 500
+_MAX_TEXT_LENGTH = 500
 
 
 class Problems:
@@ -23,8 +23,9 @@ class Problems:
         return bool(self._by_kind)
 
     def add(self, kind: str, *, value: str, allowed: str, row: int | None = None, column: str | None = None) -> None:
-        """Note a problem: the row's number as an editor shows it or None, the file's column or None, its value there,
-        what is allowed.
+        """Note a problem: the value that is wrong, what is allowed, and where.
+
+        row: number as an editor shows it; column: of the file; None where the problem has none.
         """
         file, row = self._file, None if row is None else int(row)
         if column is not None and column.partition(", ")[0] in self._elsewhere:
@@ -35,7 +36,7 @@ class Problems:
         self._by_kind[kind].append(problem)
 
     def elsewhere(self, file: str, columns: Iterable[str], rows: Mapping[int, int]) -> None:
-        """Columns stand in another file, whose rows are given by those of this one."""
+        """State that columns are in another file; rows: row of this file to row of that one."""
         self._elsewhere |= dict.fromkeys(columns, (str(file), rows))
 
     def refuse(self) -> None:
@@ -62,11 +63,11 @@ class Problems:
         column: str | None = None,
         error: type[IngestError] = IngestError,
     ) -> NoReturn:
-        """Raise an IngestError, of a class, for a problem that leaves nothing more to look at."""
+        """Raise the error, an IngestError, for a problem after which no further check is possible."""
         self.add("file", row=row, column=column, value=value, allowed=allowed)
         raise error(self._listed())
 
 
 def _short(text: str) -> str:
     """Text that fits into a message; a broken file can make one cell of everything below it."""
-    return text if len(text) <= _LENGTH else f"{text[:_LENGTH]}... ({len(text)} characters)"
+    return text if len(text) <= _MAX_TEXT_LENGTH else f"{text[:_MAX_TEXT_LENGTH]}... ({len(text)} characters)"

@@ -34,7 +34,7 @@ class StatedLimits:
 
     @property
     def words(self) -> str:
-        """The limits that are stated as a note, "" where none is."""
+        """A note with the stated limits, "" where none is stated."""
         stated = ((name, getattr(self, name)) for name in ("payload_kg", "speed_mm_s", "minutes"))
         listed = [f"{name} {value:g}" for name, value in stated if value is not None]
         return f"{WITHIN_LIMITS} {', '.join(listed)}" if listed else ""
@@ -71,7 +71,7 @@ class RunLimits:
         return max(own_mm_s, _rounded_down(most, 2))
 
     def slower(self, rate: npt.NDArray[np.float64]) -> float:
-        """Factor by which a motion may be faster, or has to be slower, whose drives have rates (.., K) at most."""
+        """Largest factor by which a motion with drive rates (.., K) may be sped up; below 1 it has to be slower."""
         if self.rates is None:
             return np.inf
         share = np.abs(rate) / self.rates
@@ -79,7 +79,7 @@ class RunLimits:
         return float(1.0 / highest) if highest > 0.0 else np.inf
 
     def allows(self, speed_mm_s: float, payload_kg: float, seconds: float = np.nan) -> bool:
-        """Whether a run stays within the limits; NaN is unknown and does."""
+        """Whether a run stays within the limits; NaN is unknown and counts as within."""
         return not (speed_mm_s > self.speed_mm_s or payload_kg > self.payload_kg or seconds > self.seconds)
 
 
