@@ -86,10 +86,10 @@ class DiagnosisOptions:
     prior_some_legs: float = 0.1
     # sets this far below the best are not worth an evaluation: e^-6 is 0.0025
     window_nats: float = 6.0
-    # a set so far below the best at one level is tried at no other: e^-15 is 3e-7
+    # a set this far below the best at one discrepancy level is tried at no other level: e^-15 is 3e-7
     hopeless_nats: float = 15.0
-    # a noise model whose evidence after a climb alone is so far below the best gets no full search, which has added at
-    # most 0.3 nats
+    # another noise model whose log likelihood after a climb alone is this far below what it needs gets no full search:
+    # that has added 0.3 nats
     max_climb_below_nats: float = 3.0
     # a set of a smaller share of the probability has no neighbours that matter; assumed
     min_expanded_probability: float = 0.01
@@ -136,8 +136,8 @@ class DiagnosisOptions:
     # an effect that predicts left-out points worse by more than this is ruled out; with something unexplained it has to
     # predict them better by as much
     max_heldout_loss_nats: float = 3.0
-    # an answer is rejected where it predicts more stops worse than chance does, by so many standard deviations; the
-    # usual 5 %
+    # an answer is rejected where it predicts more left-out stops worse than no effect does, by so many standard
+    # deviations of chance; the usual 5 %
     max_further_off: float = 2.0
     # no cause is named while "none" is more probable: a false alarm costs more than a small gap that is not found
     max_none_probability: float = 0.2
@@ -159,8 +159,9 @@ class DiagnosisOptions:
     max_group_size: int = 3
     # something unexplained is more probable than not
     min_unexplained_probability: float = 0.5
-    # a best answer that leaves so many times the noise is not of the robot that was measured: an arm without an effect
-    # for its worst cause leaves ten or twenty times, exchanged drives or a wrong tool thousands of times; assumed
+    # the best answer leaves a residual of so many times the noise: the robot is not the one that was measured. An arm
+    # without an effect for its worst cause leaves ten or twenty times, exchanged drives or a wrong tool thousands of
+    # times; assumed
     max_left_per_noise: float = 100.0
     # residuals of stops in no order that are so many times the noise of repeated poses have a part that is unexplained
     # and larger than that noise: the root of two

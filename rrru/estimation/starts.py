@@ -58,11 +58,9 @@ def register_poses(
     if known.sum() < _MIN_READINGS:
         raise FitError(f"{known.sum()} readings at poses that the robot can take; allowed: at least {_MIN_READINGS}")
     orientations = None if readings.turn is None else readings.turn[known]
-    characteristic_length_mm = (
-        readings.characteristic_length_mm
-        if np.isfinite(readings.characteristic_length_mm)
-        else robot.characteristic_length_mm
-    )
+    characteristic_length_mm = readings.characteristic_length_mm
+    if not np.isfinite(characteristic_length_mm):
+        characteristic_length_mm = robot.characteristic_length_mm
     found = TargetReadings(
         centre[known],
         turn[known],
@@ -130,17 +128,17 @@ def register_measurements(measurements: pd.DataFrame, robot: Robot) -> pd.DataFr
     off = off[np.isfinite(off)]
     if not len(off) or np.median(off) <= LOST_SHARE_OF_SIZE * robot.size_mm:
         return measurements
-    seen = robot, poses.of(used), twists, readings.of(used)
-    most = max(FAR_SHARE_OF_SIZE * robot.size_mm, _MAX_SHARE_AFTER * float(np.median(off)))
+    used_readings = robot, poses.of(used), twists, readings.of(used)
+    max_median_mm = max(FAR_SHARE_OF_SIZE * robot.size_mm, _MAX_SHARE_AFTER * float(np.median(off)))
     try:
-        found = register_poses(*seen)
+        found = register_poses(*used_readings)
     except FitError:
         return measurements
-    if found.median_mm <= most:
+    if found.median_mm <= max_median_mm:
         return _moved(measurements, robot, readings, found)
-    if (flipped := register_poses(*seen, mirrored=True).median_mm) <= most:
+    if (mirrored_mm := register_poses(*used_readings, mirrored=True).median_mm) <= max_median_mm:
         raise FitError(
-            f"measured positions are {found.median_mm:.3g} mm off in a right-handed frame, {flipped:.3g} mm in a "
+            f"measured positions are {found.median_mm:.3g} mm off in a right-handed frame, {mirrored_mm:.3g} mm in a "
             "left-handed one (medians); allowed: a right-handed frame: change the sign of one measured axis"
         )
     return measurements

@@ -72,12 +72,12 @@ def _of_bar(open_legs: Legs, legs: Legs, place: Place, bar: Bar, mass: float, at
     near = walk(legs, leg, actuators, legs.home_passive[None], Twists(legs)).place[0]
     far = way.place[0] + way.turn[0] @ bar.platform_mm
     line = (far - near) / np.linalg.norm(far - near)
-    spots = _transformed(_behind(open_legs, chain, way, place.joint), at)
+    body_points = _transformed(_behind(open_legs, chain, way, place.joint), at)
     slides = [k for k, joint in enumerate(chain.joints) if joint.kind == "P" and k >= len(leg.joints) - 1]
     moving = bool(slides) and place.joint >= slides[0]
-    middle = spots.mean(axis=0)
-    along = (spots - middle) @ line
-    arm = np.sqrt(0.5 * (((spots - middle) ** 2).sum(axis=1) + along**2).mean())
+    middle = body_points.mean(axis=0)
+    along = (body_points - middle) @ line
+    arm = np.sqrt(0.5 * (((body_points - middle) ** 2).sum(axis=1) + along**2).mean())
     centre = (middle - (far if moving else near)) @ line
     site = leg.bar_sites[1 if moving else 0]
     return [PointMass(site, 0.5 * mass, np.array([centre + side * arm, 0.0, 0.0])) for side in (1.0, -1.0)]

@@ -36,13 +36,14 @@ def trust(
     moved = with_effects.query("effect == 'calibration'")[["campaign", "parameter", "value", "low_95", "high_95"]]
     rows = rows.merge(moved.rename(columns={"value": "moved"}), how="left", on=["campaign", "parameter"])
     rows = rows.assign(unexplained=rows["campaign"].map(answers).fillna("").str.contains("unexplained"))
-    said: dict[str, Callable[[Mapping[str, Any]], str | None]] = {
+    texts: dict[str, Callable[[Mapping[str, Any]], str | None]] = {
         "value": _value,
         "judgement": lambda row: _judgement(row, _inseparable(row, correlations)),
         "with_effects": lambda row: _interval(row["moved"], row["low_95"], row["high_95"], row["unit"]),
         "true_value": lambda row: _plain(row["true_value"], row["unit"]),
     }
-    return rows.assign(**{name: [say(row) for row in rows.to_dict("records")] for name, say in said.items()})[COLUMNS]
+    judged = {name: [text_of(row) for row in rows.to_dict("records")] for name, text_of in texts.items()}
+    return rows.assign(**judged)[COLUMNS]
 
 
 def _plain(value: float, unit: str) -> str | None:

@@ -129,7 +129,7 @@ class Machine:
                     self._set_payload(payload[point])
                 self.shape.write(1.0, time_s[point])
                 before, here = index[point - 1 : point + 1]
-                self._send(way.in_time(point) if on_time else way.slowly(before, here, way.far[point]))
+                self._send(way.in_time(point) if on_time else way.slowly(before, here, way.distance_m[point]))
             where = f"point {point + 1} of {len(index)}"
             if not on_time or not way.moving[point]:
                 self._wait_for_rest(where)
@@ -158,14 +158,14 @@ class Machine:
 
     def _wait_for_rest(self, where: str) -> None:
         """Wait until the platform is at rest twice in a row."""
-        calm = 0
+        blocks_at_rest = 0
         for block in range(_MAX_BLOCKS):
             mujoco.mj_step(self.model, self.data, nstep=_BLOCK_STEPS[block % 2])
             velocity = np.zeros(6)
             mujoco.mj_objectVelocity(self.model, self.data, mujoco.mjtObj.mjOBJ_XBODY, self.platform, velocity, 0)
             speed = MM * max(_CHARACTERISTIC_LENGTH_M * np.linalg.norm(velocity[:3]), np.linalg.norm(velocity[3:]))
-            calm = calm + 1 if speed < REST_MM_S else 0
-            if calm == len(_BLOCK_STEPS):
+            blocks_at_rest = blocks_at_rest + 1 if speed < REST_MM_S else 0
+            if blocks_at_rest == len(_BLOCK_STEPS):
                 return
         self._require_stable(where)
         waited = f"still moves at {speed:.3g} mm/s after {STEP_S * _MAX_BLOCKS * np.mean(_BLOCK_STEPS):.1f} s"
@@ -195,17 +195,19 @@ class _ControlPath:
         slope = np.gradient(motion.path_drive, axis=0)[self.index] if len(path) > 1 else np.ones_like(rate)
         # rows of the path in a second
         self.speed = (rate * slope).sum(axis=1) / np.maximum((slope**2).sum(axis=1), 1e-30)
-        self.far = np.linalg.norm(np.diff(spots, axis=0, prepend=spots[:1]), axis=1)
+        self.distance_m = np.linalg.norm(np.diff(spots, axis=0, prepend=spots[:1]), axis=1)
 
     def moves(self, point: int) -> bool:
         """Whether the drives move at a point or the one before."""
         return bool(self.moving[point - 1] or self.moving[point])
 
-    def slowly(self, first: int, last: int, far: float = 0.0) -> FloatArray:
-        """Controls (m, K) from row to row of the path, at least so far in m, with a smooth start and end."""
+    def slowly(self, first: int, last: int, distance_m: float = 0.0) -> FloatArray:
+        """Controls (m, K) from row to row of the path with a smooth start and end; distance_m: of the platform's move."""
         rows = np.arange(len(self.path))
         turned = np.abs(np.diff(self.path[first : last + 1], axis=0)).max(axis=1, initial=0.0).sum()
-        seconds = np.sqrt(_PEAK_ACCELERATION * max(far, _CHARACTERISTIC_LENGTH_M * turned) / _MAX_ACCELERATION_M_S2)
+        seconds = np.sqrt(
+            _PEAK_ACCELERATION * max(distance_m, _CHARACTERISTIC_LENGTH_M * turned) / _MAX_ACCELERATION_M_S2
+        )
         at = first + (last - first) * _smooth(round(max(seconds, _MIN_MOVE_S) / STEP_S))
         return np.stack([np.interp(at, rows, drive) for drive in self.path.T], axis=1)
 

@@ -277,7 +277,7 @@ def _section(name):
     body = re.sub(r"^(Assumptions|Source):", r"**\1:**", body.strip(), flags=re.MULTILINE)
     scenes, meaning = _scenes(name), _meaning(name)
     parts = [f"## {name}\n", f"*{meaning[:1].upper()}{meaning[1:]}.*\n", body + "\n", _sizes(name)]
-    needs = "; ".join(dict.fromkeys(NEEDS[need] for need in _made(name).needs)) or "poses, nothing more"
+    needs = "; ".join(dict.fromkeys(NEEDS[need] for need in _example(name).needs)) or "poses, nothing more"
     parts.append(f"**The file must hold:** {needs}.\n")
     texts = cause_texts(name)
     parts.append(f"**On the machine:** {texts.inspect} {texts.remedy}\n")
@@ -290,7 +290,7 @@ def _section(name):
     return "\n".join(parts)
 
 
-def _made(name):
+def _example(name):
     """The effect on the first robot here that can have it."""
     robots = (*(scene.problem().mechanism for scene in SCENES), _two_arms())
     return next(effect for robot in robots if (effect := library(robot).get(name)))
@@ -306,7 +306,7 @@ def _two_arms():
 
 def _sizes(name):
     """Table of an effect's parameters, those of all legs or drives in one row."""
-    effect = _made(name)
+    effect = _example(name)
     if not len(effect.coordinates):
         return f"{_SEARCHED_ORDERS_TEXT}\n"
     coordinates = effect.coordinates

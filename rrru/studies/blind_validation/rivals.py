@@ -75,10 +75,10 @@ class Campaign:
 def _unit(columns, base):
     """Columns (n, k) projected onto the complement of base (n, p), of unit length; zero where nothing remains."""
     basis, _ = np.linalg.qr(base)
-    left, whole = columns - basis @ (basis.T @ columns), np.linalg.norm(columns, axis=0)
-    size = np.linalg.norm(left, axis=0)
-    seen = size > _MIN_VISIBLE_SHARE * whole
-    return np.where(seen, left / np.where(seen, size, 1.0), 0.0)
+    projected, whole = columns - basis @ (basis.T @ columns), np.linalg.norm(columns, axis=0)
+    size = np.linalg.norm(projected, axis=0)
+    visible = size > _MIN_VISIBLE_SHARE * whole
+    return np.where(visible, projected / np.where(visible, size, 1.0), 0.0)
 
 
 def _projected_data(campaign):
@@ -196,30 +196,30 @@ def _marginal(reduced, chosen):
 def gaussian_process(campaign):
     """Fraction of the gap predicted on held-out runs by a Gaussian process of place, direction, time, speed, payload.
 
-    NaN where nothing is left above the noise.
+    NaN where no residual exceeds the noise.
     """
     from sklearn.gaussian_process import GaussianProcessRegressor
     from sklearn.gaussian_process.kernels import RBF, ConstantKernel
     from sklearn.model_selection import GroupKFold
 
-    points, left = campaign.problem.points, _projected_data(campaign).reshape(-1, 3)
-    seen = np.column_stack(
+    points, residual = campaign.problem.points, _projected_data(campaign).reshape(-1, 3)
+    inputs = np.column_stack(
         [rows.command(points), rows.direction(points), points[list(_SCALAR_INPUTS)].to_numpy(dtype=float)]
     )
-    seen = seen[:, np.ptp(seen, axis=0) > 0.0]
-    seen = (seen - seen.mean(axis=0)) / seen.std(axis=0)
-    few = slice(None, None, max(len(seen) // _HYPERPARAMETER_POINTS, 1))
-    kernel = ConstantKernel(1.0, (1e-3, 1e5)) * RBF(np.ones(seen.shape[1]), (1e-1, 1e3))
+    inputs = inputs[:, np.ptp(inputs, axis=0) > 0.0]
+    inputs = (inputs - inputs.mean(axis=0)) / inputs.std(axis=0)
+    subset = slice(None, None, max(len(inputs) // _HYPERPARAMETER_POINTS, 1))
+    kernel = ConstantKernel(1.0, (1e-3, 1e5)) * RBF(np.ones(inputs.shape[1]), (1e-1, 1e3))
     with warnings.catch_warnings():
         # a length scale at its bound is valid: that input does not matter
         warnings.simplefilter("ignore")
-        kernel = GaussianProcessRegressor(kernel, alpha=1.0).fit(seen[few], left[few]).kernel_
-    after = np.empty_like(left)
+        kernel = GaussianProcessRegressor(kernel, alpha=1.0).fit(inputs[subset], residual[subset]).kernel_
+    after = np.empty_like(residual)
     runs = points["run"].to_numpy()
-    for learned, held_out in GroupKFold(min(_FOLDS, len(np.unique(runs)))).split(seen, groups=runs):
-        model = GaussianProcessRegressor(kernel, alpha=1.0, optimizer=None).fit(seen[learned], left[learned])
-        after[held_out] = left[held_out] - model.predict(seen[held_out])
-    gaps = [max((one**2).sum(axis=1).mean() - 3.0, 0.0) for one in (left, after)]
+    for training, held_out in GroupKFold(min(_FOLDS, len(np.unique(runs)))).split(inputs, groups=runs):
+        model = GaussianProcessRegressor(kernel, alpha=1.0, optimizer=None).fit(inputs[training], residual[training])
+        after[held_out] = residual[held_out] - model.predict(inputs[held_out])
+    gaps = [max((one**2).sum(axis=1).mean() - 3.0, 0.0) for one in (residual, after)]
     return float(1.0 - gaps[1] / gaps[0]) if gaps[0] > 0.0 else np.nan
 
 

@@ -192,9 +192,9 @@ def limits(problem, deviations, acting, names):
     freedom = int(np.linalg.matrix_rank(true))
     signal = sum(reduced.columns[key] @ np.array(cause.coordinates) for key, cause in causes.items())
     truth = frozenset(one.effect for one in acting)
-    # several effects at once may be confounded with what the library does not hold
-    most = len(causes) if truth <= set(names) else _MAX_RIVALS
-    rival, left = reduced.rival(signal, truth, rivals, most)
+    # a cause outside the library may be confounded with several effects at once
+    max_size = len(causes) if truth <= set(names) else _MAX_RIVALS
+    rival, left = reduced.rival(signal, truth, rivals, max_size)
     share = 1.0 - float(np.sqrt(left / (signal**2).sum()))
     return Limits(gain, freedom, bool(gain > chi2.ppf(1.0 - _FALSE_ALARM_PROBABILITY, freedom)), rival, left, share)
 
@@ -226,10 +226,10 @@ class _Reduced:
         self.columns = dict(zip(keys, np.split(triangle[:, :-1], ends[:-1], axis=1), strict=True))
         self.data = triangle[:, -1]
 
-    def rival(self, signal, truth, rivals, most):
-        """Name and chi-square of the wrong set, of up to `most` effects, with the least residual of a signal (k,)."""
+    def rival(self, signal, truth, rivals, max_size):
+        """Name and chi-square of the wrong set, of at most max_size effects, with the least residual of a signal (k,)."""
         best = ("", np.inf)
-        for size in range(1, most + 1):
+        for size in range(1, max_size + 1):
             for keys in combinations(rivals, size):
                 names = frozenset(name for name, _ in keys)
                 if len(names) < size or names == truth:

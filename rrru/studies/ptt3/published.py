@@ -63,7 +63,7 @@ def _design(section):
 
 def _networks(curve, chosen, training, order):
     """Spreads of the chosen networks for inputs scaled to -1..1 over the largest range, and their median steps."""
-    half_mm = max(curve["radius_mm"], 0.5 * np.ptp(curve["z_mm"]))
+    half_range_mm = max(curve["radius_mm"], 0.5 * np.ptp(curve["z_mm"]))
     keys = ["experiment", "spread_from", "learns", "spread_mm"]
     curves = pd.merge(chosen[keys], training, on=keys, how="left").sort_values("neurons").groupby(keys)
     steps = []
@@ -71,5 +71,5 @@ def _networks(curve, chosen, training, order):
         error = np.sqrt(part["validation_mse_mm2"].to_numpy())
         # the fewest neurons with an error near the minimum
         steps.append(part["neurons"].to_numpy()[np.argmax(error <= (1.0 + _MAX_EXCESS_ERROR) * error.min())])
-    spreads = {f"spread_{order[row.experiment]}": row.spread_mm / half_mm for row in chosen.itertuples()}
+    spreads = {f"spread_{order[row.experiment]}": row.spread_mm / half_range_mm for row in chosen.itertuples()}
     return spreads | {"training_steps": float(np.median(steps))}

@@ -48,7 +48,7 @@ def judge(claim, truth, facts):
     return None if found is None else bool(found)
 
 
-def _sized(said, true, truth, count, error_mm2=0.0):
+def _sized(claimed, true, truth, count, error_mm2=0.0):
     """Whether a size agrees with the true one within the tolerance for a count of points.
 
     error_mm2: standard error of the true mean square; None where that could make it agree.
@@ -58,7 +58,7 @@ def _sized(said, true, truth, count, error_mm2=0.0):
     spread = truth.noise_rms_mm**2 * np.sqrt(2.0 / (3.0 * count)) + 2.0 * truth.noise_rms_mm * true / np.sqrt(
         3.0 * count
     )
-    off = abs(float(said) ** 2 - true**2) - _STANDARD_ERRORS * spread - _SQUARE_TOLERANCE * true**2
+    off = abs(float(claimed) ** 2 - true**2) - _STANDARD_ERRORS * spread - _SQUARE_TOLERANCE * true**2
     return True if off <= 0.0 else None if off <= _STANDARD_ERRORS * error_mm2 else False
 
 
@@ -217,9 +217,9 @@ def _needs_different(stated, truth, _facts):
     return False if "time_s" in needs else truth.payloads == 1 if "payload_kg" in needs else None
 
 
-def _within(said, true_mm):
+def _within(claimed, true_mm):
     """Whether an rms agrees with the true one within a tenth."""
-    return abs(float(said) / true_mm - 1.0) <= _RMS_TOLERANCE if np.isfinite(true_mm) else None
+    return abs(float(claimed) / true_mm - 1.0) <= _RMS_TOLERANCE if np.isfinite(true_mm) else None
 
 
 def _lost(stated, _truth, facts):
