@@ -202,7 +202,7 @@ class _ControlPath:
         return bool(self.moving[point - 1] or self.moving[point])
 
     def slowly(self, first: int, last: int, distance_m: float = 0.0) -> FloatArray:
-        """Controls (m, K) from row to row of the path with a smooth start and end; distance_m: of the platform's move."""
+        """Controls (m, K) from row to row of the path, with a smooth start and end; distance_m: of the platform."""
         rows = np.arange(len(self.path))
         turned = np.abs(np.diff(self.path[first : last + 1], axis=0)).max(axis=1, initial=0.0).sum()
         seconds = np.sqrt(

@@ -227,7 +227,7 @@ class _Reduced:
         self.data = triangle[:, -1]
 
     def rival(self, signal, truth, rivals, max_size):
-        """Name and chi-square of the wrong set, of at most max_size effects, with the least residual of a signal (k,)."""
+        """Name and chi-square of the wrong set, of at most max_size effects, that best reproduces a signal (k,)."""
         best = ("", np.inf)
         for size in range(1, max_size + 1):
             for keys in combinations(rivals, size):
