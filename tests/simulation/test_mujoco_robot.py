@@ -122,7 +122,7 @@ def test_a_loop_that_is_not_closed_is_an_error_that_says_where_and_how_far(tmp_p
 def test_a_robot_that_is_not_at_rest_is_an_error_that_says_where_and_how_fast(monkeypatch):
     """Friction that holds a stretched servo lets it creep: less than the limit, but more than nothing."""
     monkeypatch.setattr(mujoco_run, "REST_MM_S", 1e-6)
-    monkeypatch.setattr(mujoco_run, "_MOST_BLOCKS", 10)
+    monkeypatch.setattr(mujoco_run, "_MAX_BLOCKS", 10)
     with pytest.raises(SimulationError, match=r"point \d of 4 still moves at .* mm/s after 0.1 s; allowed: less than"):
         standing(simulated("rrru3", play={"drive1": 1e-3}), near_home("rrru3", *_AWAY))
 
