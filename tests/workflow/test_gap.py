@@ -128,7 +128,7 @@ def test_dimensions_that_a_robot_does_not_have_are_refused(measured, tmp_path):
 
 def test_the_check_on_withheld_effects_runs_from_robots_to_figure(results):
     scores = pd.read_parquet(results / "tables/withheld_scores.parquet").set_index(["check", "robot"])
-    assert len(scores.loc["label"]) == 2 and len(scores.loc["effect"]) == 1
+    assert len(scores.loc["label"]) == 4 and len(scores.loc["effect"]) == 1
     assert scores.loc[("field", "field_09"), "right"]
     assert scores.loc[("effect", "effect_backlash_0000"), "truth"] == "backlash"
     assert len(scores.loc["many"]) == len(scores.loc["background"]) == len(scores.loc["own"]) == 1
