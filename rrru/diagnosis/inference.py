@@ -82,8 +82,7 @@ class InferenceResult:
     @property
     def log_likelihood(self) -> float:
         """Logarithm of the marginal likelihood of the readings under the noise, up to a constant of the readings."""
-        evidence = self.evidence.on_library()
-        return self.posterior.total - 3.0 * len(evidence) * float(np.log(evidence.noise.mean_mm))
+        return _log_likelihood(self.evidence, self.posterior)
 
     @property
     def lacks_fit(self) -> bool:
@@ -526,6 +525,12 @@ def _rounds(problem: DiagnosisProblem, calibrated: ModelState, prior: Prior, sta
     return result
 
 
+def _log_likelihood(evidence: ModelEvidence, posterior: Posterior) -> float:
+    """`InferenceResult.log_likelihood` of a posterior over sets of terms."""
+    readings = evidence.on_library()
+    return posterior.total - 3.0 * len(readings) * float(np.log(readings.noise.mean_mm))
+
+
 def _with_hidden_offsets(inference: InferenceResult, prior: Prior, stated_mm: float | None) -> InferenceResult:
     """The inference, or the one with offsets between the runs where these are more probable.
 
@@ -545,7 +550,7 @@ def _with_hidden_offsets(inference: InferenceResult, prior: Prior, stated_mm: fl
     space = ModelSpace(evidence.on_library(), prior)
     climbed = space.posterior([space.climb(inference.hypothesis.terms)])
     # a search about another state is worth its time where the same columns show a chance
-    if replace(inference, evidence=evidence, posterior=climbed).log_likelihood < least - OPTIONS.max_climb_below_nats:
+    if _log_likelihood(evidence, climbed) < least - OPTIONS.max_climb_below_nats:
         return inference
     found = replace(_rounds(other, inference.calibrated, prior, KNOWN), noise_from=source)
     return found if found.log_likelihood > least else inference

@@ -88,8 +88,8 @@ class DiagnosisOptions:
     window_nats: float = 6.0
     # a set this far below the best at one discrepancy level is tried at no other level: e^-15 is 3e-7
     hopeless_nats: float = 15.0
-    # another noise model whose log likelihood after a climb alone is this far below what it needs gets no full search:
-    # that has added 0.3 nats
+    # another noise model whose log likelihood after a short search is this far below what it needs gets no full search:
+    # that has added 0.3 nats on one robot; assumed
     max_climb_below_nats: float = 3.0
     # a set of a smaller share of the probability has no neighbours that matter; assumed
     min_expanded_probability: float = 0.01
@@ -136,8 +136,8 @@ class DiagnosisOptions:
     # an effect that predicts left-out points worse by more than this is ruled out; with something unexplained it has to
     # predict them better by as much
     max_heldout_loss_nats: float = 3.0
-    # an answer is rejected where it predicts more left-out stops worse than no effect does, by so many standard
-    # deviations of chance; the usual 5 %
+    # an answer is rejected where its predictions at left-out stops are further off than those of the calibration alone,
+    # in mean square and at more stops than chance explains, by so many standard deviations; the usual 5 %
     max_further_off: float = 2.0
     # no cause is named while "none" is more probable: a false alarm costs more than a small gap that is not found
     max_none_probability: float = 0.2
