@@ -11,7 +11,7 @@ from itertools import combinations
 
 import numpy as np
 import pandas as pd
-from scipy.special import ndtr
+from scipy.special import gammaincinv, ndtr
 
 from rrru.arrays import BoolArray, FloatArray, IntArray
 from rrru.diagnosis.discrepancy_basis import UNKNOWN
@@ -200,7 +200,9 @@ def _noise_parts(
     model = problem.noise or NoiseModel.white(problem.noise_mm)
     # degrees of freedom of one axis: the parameters are fitted to all three axes together
     freedom = max(len(problem) - inference.evidence.linear.calibration_basis.shape[1] / 3.0, 1.0)
-    axes = model.axis_mm**2 * (1.0 + np.sqrt(2.0 / freedom) * generator.standard_normal((draws, 3)))
+    # a mean of so many squares is distributed as chi^2 over its degrees of freedom
+    chance = ndtr(generator.standard_normal((draws, 3)))
+    axes = model.axis_mm**2 * gammaincinv(0.5 * freedom, chance) / (0.5 * freedom)
     scatter, probability = np.zeros((draws, 3)), np.nan
     if stated_mm:
         beyond = model.axis_mm > CONTRADICTED * stated_mm

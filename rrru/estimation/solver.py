@@ -19,7 +19,6 @@ mean, and of a product of two factors a pair that fits the readings, which the m
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -255,8 +254,10 @@ class _Search:
             return trial
         self.straight = False
         if self._problem.loss == "linear":
-            beyond = trial.residual.ravel() - white[:, -1] - white[:, free] @ step.change
-            corrected = self._along(step.change + step.correction(white[:, free].T @ beyond), free)
+            whole = np.zeros(len(self.values))
+            whole[free] = step.change
+            beyond = trial.residual.ravel() - white[:, -1] - white[:, :-1] @ whole
+            corrected = self._along(step.change + step.correction((white[:, :-1].T @ beyond)[free]), free)
             trial = min(trial, corrected, key=lambda one: one.cost)
             if self.cost - trial.cost >= wanted:
                 return trial
@@ -358,20 +359,34 @@ class _Linearized:
         damped, free = triangle_of(whole), np.ones(count, dtype=bool)
         step = -unit * solve_triangular(damped[:-1, :-1], damped[:-1, -1])
         if ((step < self.low) | (step > self.high)).any():
-            found = _between(damped, self.low / unit, self.high / unit)
-            step, free = np.clip(unit * found.x, self.low, self.high), found.active_mask == 0
-            step[~free] = np.where(found.active_mask < 0, self.low, self.high)[~free]
+            found, side = _between(damped, self.low / unit, self.high / unit)
+            step, free = np.clip(unit * found, self.low, self.high), side == 0
+            step[~free] = np.where(side < 0, self.low, self.high)[~free]
             damped = triangle_of(whole[:, [*np.flatnonzero(free), count]])
         moved = columns @ step
         slope = -float(target @ moved)
         return _Step(step, slope - 0.5 * float(moved @ moved), slope, free, unit[free], damped[:-1, :-1])
 
 
-def _between(triangle: FloatArray, low: FloatArray, high: FloatArray) -> Any:
-    """Result of `scipy.optimize.lsq_linear` for the triangle (k + 1, k + 1) of columns and residual, between bounds."""
+def _between(triangle: FloatArray, low: FloatArray, high: FloatArray) -> tuple[FloatArray, IntArray]:
+    """Least squares (k,) of a triangle (k + 1, k + 1) of columns and residual between bounds, and the sides (k,).
+
+    Side -1 is a parameter at its lower bound, 1 at its upper one, 0 inside. Bounds count for those parameters alone
+    that leave them otherwise: the others are eliminated, which is faster where few of many parameters do.
+    """
     from scipy.optimize import lsq_linear
 
     count = len(low)
-    return lsq_linear(
-        triangle[:-1, :-1], -triangle[:-1, -1], (low, high), method="bvls", tol=_BOUNDED, max_iter=20 * count
-    )
+    found, side = -solve_triangular(triangle[:-1, :-1], triangle[:-1, -1]), np.zeros(count, dtype=int)
+    bounded = np.zeros(count, dtype=bool)
+    while (leaves := ~bounded & ((found < low) | (found > high))).any():
+        bounded |= leaves
+        inside, some = np.flatnonzero(~bounded), np.flatnonzero(bounded)
+        ordered = np.linalg.qr(triangle[:, [*inside, *some, count]], mode="r")
+        first, last = slice(len(inside)), slice(len(inside), count)
+        limits = low[some], high[some]
+        best = lsq_linear(ordered[last, last], -ordered[last, -1], limits, "bvls", _BOUNDED, max_iter=20 * count)
+        found[some], side[some] = best.x, best.active_mask
+        rest = ordered[first, -1] + ordered[first, last] @ best.x
+        found[inside] = -solve_triangular(ordered[first, first], rest)
+    return found, side

@@ -122,18 +122,34 @@ def test_what_does_not_repeat_is_scatter():
     assert budget.loc["drive_compliance", "rms_mm"] == pytest.approx(true, rel=0.15)
 
 
+def _of_few_stops(generator, noise_mm, count, stated_mm):
+    """`_noise_parts` of 20 stops, of whose 60 numbers so many parameters are fitted."""
+    basis, _ = np.linalg.qr(generator.standard_normal((60, count)))
+    linear = SimpleNamespace(calibration_basis=basis, base=basis.reshape(20, 3, count))
+    inference = SimpleNamespace(problem=_Stops(NoiseModel.white(noise_mm)), evidence=SimpleNamespace(linear=linear))
+    return _noise_parts(inference, stated_mm, generator, 20000)
+
+
 def test_of_few_stops_the_noise_above_the_stated_one_is_scatter():
     """Of 60 numbers 27 parameters leave 11 per axis; scatter and instrument are what they are within a tenth."""
-    generator, model = np.random.default_rng(1), NoiseModel.white(2.0 * NOISE_MM)
-    basis, _ = np.linalg.qr(generator.standard_normal((60, 27)))
-    linear = SimpleNamespace(calibration_basis=basis, base=basis.reshape(20, 3, 27))
-    inference = SimpleNamespace(problem=_Stops(model), evidence=SimpleNamespace(linear=linear))
-    instrument, parts = _noise_parts(inference, NOISE_MM, generator, 20000)
+    instrument, parts = _of_few_stops(np.random.default_rng(1), 2.0 * NOISE_MM, 27, NOISE_MM)
     scatter, probability = parts["scatter"]
     assert instrument.mean() == pytest.approx(3.0 * NOISE_MM**2, rel=0.1)
     assert scatter.mean() == pytest.approx(9.0 * NOISE_MM**2, rel=0.1)
     assert scatter.std() == pytest.approx(np.sqrt(3.0 * 2.0 / 11.0) * 4.0 * NOISE_MM**2, rel=0.1)
     assert probability > 0.95
+
+
+@pytest.mark.parametrize("freedom", [2, 4, 11])
+def test_draws_of_the_noise_are_those_of_a_mean_of_squares(freedom):
+    """Against means of squares of normal numbers, of three axes: no draw is negative."""
+    generator = np.random.default_rng(freedom)
+    drawn, _ = _of_few_stops(generator, NOISE_MM, 3 * (20 - freedom), None)
+    squares = (NOISE_MM * generator.standard_normal((3, freedom, 20000))) ** 2
+    expected = squares.mean(axis=1).sum(axis=0)
+    at = [0.025, 0.25, 0.5, 0.75, 0.975]
+    assert drawn.min() > 0.0
+    np.testing.assert_allclose(np.quantile(drawn, at), np.quantile(expected, at), rtol=0.05)
 
 
 def test_the_scatter_is_unknown_where_no_noise_is_stated():

@@ -12,7 +12,7 @@ from rrru.estimation.estimate import numerical_rank, triangle_of
 from rrru.estimation.noise_model import NoiseModel
 from rrru.estimation.parameters import Block, Parameters
 from rrru.estimation.problem import Problem
-from rrru.estimation.solver import LOSSES, SolverOptions, solve
+from rrru.estimation.solver import LOSSES, SolverOptions, _between, solve
 
 NOISE = 0.1
 
@@ -122,6 +122,19 @@ def test_ill_conditioned_readings_between_bounds_end_where_the_bounded_least_squ
     found = solve(Problem(Bent(matrix, data), parameters, lambda v: v / NOISE), [np.zeros(7)])
     best = optimize.lsq_linear(matrix / NOISE, data / NOISE, (-1.0, 1.0), method="bvls", tol=1e-14, max_iter=200)
     assert found.end.converged and found.end.cost == pytest.approx(best.cost, rel=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_least_squares_between_bounds_that_few_of_many_parameters_reach(seed):
+    """Against the same problem with bounds for all; a third of the parameters has none."""
+    generator = np.random.default_rng(seed)
+    rows = generator.standard_normal((90, 30)) + 2.0 * generator.standard_normal((90, 1))
+    triangle = triangle_of(np.column_stack([rows, 3.0 * generator.standard_normal(90)]))
+    high = np.where(np.arange(30) % 3, 0.1, np.inf)
+    found, side = _between(triangle, -high, high)
+    best = optimize.lsq_linear(triangle[:-1, :-1], -triangle[:-1, -1], (-high, high), method="bvls", tol=1e-14)
+    np.testing.assert_allclose(found, best.x, rtol=0.0, atol=1e-9)
+    assert side.tolist() == best.active_mask.tolist() and 0 < np.count_nonzero(side) < 20
 
 
 @pytest.mark.parametrize("loss", [one for one in LOSSES if one != "linear"])
