@@ -138,5 +138,5 @@ def test_the_check_on_withheld_effects_runs_from_robots_to_figure(results):
     assert set(parts["robot"]) == set(scores.query("check != 'field'").index.get_level_values("robot"))
     methods = pd.read_parquet(results / "timings/withheld_methods.parquet").set_index("method")
     assert list(methods.index) == ["diagnosis", "bic", "lasso", "spike_and_slab", "gaussian_process"]
-    assert (methods["robots"] == 2).all()
+    assert (methods["robots"] == 1).all()
     assert (results / "figures/withheld.png").stat().st_size > 10_000

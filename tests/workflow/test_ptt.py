@@ -8,8 +8,8 @@ def test_every_experiment_stands_in_the_tables(results):
     points = pd.read_parquet(results / "tables/ptt_points.parquet")
     benefit = pd.read_parquet(results / "tables/ptt_benefit.parquet").set_index(["experiment", "method", "set", "axis"])
     assert points.groupby(["experiment", "set"]).size().unstack().to_dict() == {
-        "test": {f"ptt_{k}": 20 for k in range(1, 6)},
-        "train": {f"ptt_{k}": 160 for k in range(1, 6)},
+        "test": {f"ptt_{k}": 16 for k in range(1, 6)},
+        "train": {f"ptt_{k}": 64 for k in range(1, 6)},
     }
     for name, part in points[points["set"] == "test"].groupby("experiment"):
         for axis in "xyz":
