@@ -55,7 +55,7 @@ class EffectModel:
 
     def same_as(self, other: "EffectModel") -> bool:
         """Whether this is the same model of the same problem under the same priors as another EffectModel."""
-        same = self.problem is other.problem and self.terms == other.terms and self.signed == other.signed
+        same = self.terms == other.terms and self.signed == other.signed and self.problem.fits_as(other.problem)
         return same and np.array_equal(self.scales, other.scales)
 
     @cached_property
@@ -312,7 +312,7 @@ def fit_model(
         # where the exact model has no pose at a start with effects, it has one without them
         candidates = [model.vector(start), model.vector(ModelState(start.deviations, {}))]
         candidate = next((v for v in candidates if np.isfinite(model.residual(v)).all()), candidates[-1])
-        fits.append(solve(estimation, [candidate], _OPTIONS_OF_MANY if many else _SOLVER_OPTIONS))
+        fits.append(solve(estimation, [candidate], _OPTIONS_OF_MANY if many else _SOLVER_OPTIONS, fits))
         if (fits[-1].end.straight and fits[-1].end.converged) or many:
             break
     enough = min(fit.end.cost for fit in fits) + OPTIONS.equal_fits_nats

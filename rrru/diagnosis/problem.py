@@ -5,7 +5,7 @@ about the best one found. Lengths in mm, angles in rad.
 """
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property, partial
 from typing import Self
 
@@ -194,6 +194,24 @@ class DiagnosisProblem:
         """The problem of the points alone at which the campaign has all that some effects need."""
         rows = self.complete(effects)
         return self if rows.all() else self.without(~rows)
+
+    def fits_as(self, other: Self) -> bool:
+        """Whether what is fitted is the same as in another problem: senses of approach count at the used points only."""
+        if self is other:
+            return True
+        mine, others = self.motion, other.motion
+        names = [one.name for one in fields(self) if one.name not in ("motion", "used")]
+        of_motion = [one.name for one in fields(mine) if one.name != "approach"]
+        same = all(getattr(self, name) is getattr(other, name) for name in names)
+        same &= all(getattr(mine, name) is getattr(others, name) for name in of_motion)
+        return same and np.array_equal(self.used, other.used) and self._has_approach_of(other)
+
+    def _has_approach_of(self, other: Self) -> bool:
+        """Whether the senses of approach at the used points are those of another problem."""
+        mine, others = self.motion.approach, other.motion.approach
+        if mine is others:
+            return True
+        return np.array_equal(np.asarray(mine)[self.used], np.asarray(others)[self.used], equal_nan=True)
 
     def with_approach(self, state: ModelState) -> Self:
         """The problem with the senses in which the drives arrive, as a state and the readings determine them."""

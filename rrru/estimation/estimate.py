@@ -46,7 +46,7 @@ class Estimate:
     on the diagonal of one that neither readings nor prior determine; at_bound (p,): which parameters a bound holds;
     end: how the search ended.
     cases: of a prior that is a mixture, the posterior probability and the Estimate of each case that counts. Covariance
-    and intervals are those of this mixture.
+    and intervals are those of this mixture. first_case: the Estimate of the first case, whether it counts or not.
     bias: the part of the covariance (p, p) that a discrepancy of the model makes, None where it is taken as complete.
     """
 
@@ -56,6 +56,7 @@ class Estimate:
     at_bound: BoolArray
     end: SearchEnd
     cases: tuple[tuple[float, Self], ...] = ()
+    first_case: Self | None = None
     bias: FloatArray | None = None
 
     @classmethod
