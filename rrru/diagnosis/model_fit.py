@@ -307,7 +307,7 @@ def fit_model(
     model = EffectModel(problem, tuple(terms), np.asarray(scales, dtype=float), signed)
     estimation = Problem(model, model.parameters, whitening_of(problem, level))
     many = len(model.parameters) > OPTIONS.max_parameters_of_several_starts
-    fits = []
+    fits: list[Estimate] = []
     for start in starts:
         # where the exact model has no pose at a start with effects, it has one without them
         candidates = [model.vector(start), model.vector(ModelState(start.deviations, {}))]

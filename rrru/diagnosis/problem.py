@@ -196,7 +196,7 @@ class DiagnosisProblem:
         return self if rows.all() else self.without(~rows)
 
     def fits_as(self, other: Self) -> bool:
-        """Whether what is fitted is the same as in another problem: senses of approach count at the used points only."""
+        """Whether a fit of another problem is one of this: senses of approach count at the used points only."""
         if self is other:
             return True
         mine, others = self.motion, other.motion

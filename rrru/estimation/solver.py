@@ -123,8 +123,13 @@ def _best(
 def _solve_cases(
     problem: Problem, starts: Sequence[npt.ArrayLike], options: SolverOptions, known: Sequence[Estimate]
 ) -> Estimate:
-    """The Estimate of a problem whose prior is a mixture, see the module; a case starts where the one before ended."""
+    """The Estimate of a problem whose prior is a mixture, see the module; a case starts where the one before ended.
+
+    The first case starts at the means of the mixtures: far from its own prior a factor of a product would take the
+    other one along a curved valley.
+    """
     mixed, found = problem.parameters.mixed, list[Estimate]()
+    starts = [np.where(mixed, problem.parameters.mean, start) for start in starts]
     for parameters in problem.parameters.cases:
         search = _best(replace(problem, parameters=parameters), starts, options)
         found.append(search.estimate())
@@ -402,7 +407,7 @@ def _between(triangle: FloatArray, low: FloatArray, high: FloatArray) -> tuple[F
     while (leaves := ~bounded & ((found < low) | (found > high))).any():
         bounded |= leaves
         inside, some = np.flatnonzero(~bounded), np.flatnonzero(bounded)
-        ordered = np.linalg.qr(triangle[:, [*inside, *some, count]], mode="r")
+        ordered = np.asarray(np.linalg.qr(triangle[:, [*inside, *some, count]], mode="r"))
         first, last = slice(len(inside)), slice(len(inside), count)
         limits = low[some], high[some]
         best = lsq_linear(ordered[last, last], -ordered[last, -1], limits, "bvls", _BOUNDED, max_iter=20 * count)

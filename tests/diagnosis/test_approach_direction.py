@@ -101,6 +101,16 @@ def test_known_senses_are_those_that_were_driven_and_open_ones_are_found_from_st
     assert unknown.sum() > 30 and (np.abs(found[unknown] - share[unknown]) < 0.2).mean() > 0.9
 
 
+def test_a_fit_is_the_same_where_senses_of_approach_differ_at_points_that_it_does_not_use():
+    widths = np.array([2e-3, 2e-3, 2e-3])
+    problem, _ = _driven((active("backlash", widths),), widths)
+    moved = problem.with_approach(ModelState(ERRORS, {("backlash", 0): widths}))
+    assert not problem.fits_as(moved) and problem.fits_as(problem.at_complete(()))
+    one, other = problem.at_complete({"backlash"}), moved.at_complete({"backlash"})
+    assert len(one) < len(problem) and one.fits_as(other)
+    assert not one.fits_as(other.without(np.arange(len(other)) == 0)) and not one.fits_as(replace(other, noise_mm=0.1))
+
+
 def _likelihoods(problem, state, point, senses):
     """Likelihoods (k,) of senses (k, 3) at a point, up to a factor; what is read there is linear in them."""
 

@@ -128,3 +128,37 @@ def test_a_product_of_two_unknowns_is_followed_in_few_steps(further, start):
         stack, np.concatenate([compliance, [further]]), x_scale=sd, xtol=1e-15, ftol=1e-15, gtol=1e-15
     )
     assert found.end.cost <= least.cost * (1.0 + 1e-9)
+
+
+def _springs_of_a_mixture(noise):
+    """Problem of springs under forces that are alike, and one more force that is small or large; the compliances."""
+    generator = np.random.default_rng(5)
+    spring, force = np.arange(60) % 6, generator.uniform(4.0, 5.0, 60)
+    compliance = generator.uniform(0.5, 1.5, 6)
+    read = compliance[spring] * (force + 1.2) + noise * generator.standard_normal(60)
+    blocks = (
+        Block.of("c", [f"c{k}" for k in range(6)], ["mm"] * 6, 3.0),
+        Block.of("m", ["m"], ["kg"], 0.1, wide_sd=2.0),
+    )
+    return Problem(Springs(spring, force, read), Parameters(blocks), WhiteNoise(noise)), compliance
+
+
+@pytest.mark.parametrize("start", [0.0, 1.2, 15.0])
+def test_a_second_start_that_ends_where_the_first_did_is_not_followed_to_its_end(start):
+    """Its result is that of the first one, which it would have reached."""
+    problem, compliance = _springs_of_a_mixture(1e-2)
+    first = solve(problem, [np.append(compliance, 1.2)])
+    own = solve(problem, [np.append(np.zeros(6), start)])
+    assert solve(problem, [np.append(np.zeros(6), start)], known=[first]) is first
+    np.testing.assert_allclose(own.values, first.values, rtol=0.0, atol=1e-4 * first.standard_errors.min())
+    assert own.end.cost == pytest.approx(first.end.cost, abs=1e-8)
+
+
+def test_a_second_start_that_ends_elsewhere_has_its_own_result():
+    """Of y = x^2 both signs are as good."""
+    curved = Curved(np.zeros((20, 2)), np.tile([1.0, 0.0], (20, 1)), 4.0 + 0.1 * np.arange(20) / 20.0)
+    blocks = Block.of("x", ["x"], ["mm"], 5.0), Block.of("m", ["m"], ["kg"], 0.1, wide_sd=2.0)
+    problem = Problem(curved, Parameters(blocks), WhiteNoise(0.1))
+    first = solve(problem, [np.array([1.0, 0.0])])
+    second = solve(problem, [np.array([-1.0, 0.0])], known=[first])
+    assert first.value("x") == pytest.approx(-second.value("x")) and first.value("x") > 1.9
