@@ -201,8 +201,8 @@ def _noise_parts(
     # degrees of freedom of one axis: the parameters are fitted to all three axes together
     freedom = max(len(problem) - inference.evidence.linear.calibration_basis.shape[1] / 3.0, 1.0)
     # a mean of so many squares is distributed as chi^2 over its degrees of freedom
-    chance = ndtr(generator.standard_normal((draws, 3)))
-    axes = model.axis_mm**2 * gammaincinv(0.5 * freedom, chance) / (0.5 * freedom)
+    uniform = ndtr(generator.standard_normal((draws, 3)))
+    axes = model.axis_mm**2 * gammaincinv(0.5 * freedom, uniform) / (0.5 * freedom)
     scatter, probability = np.zeros((draws, 3)), np.nan
     if stated_mm:
         beyond = model.axis_mm > CONTRADICTED * stated_mm

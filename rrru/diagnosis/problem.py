@@ -204,14 +204,10 @@ class DiagnosisProblem:
         of_motion = [one.name for one in fields(mine) if one.name != "approach"]
         same = all(getattr(self, name) is getattr(other, name) for name in names)
         same &= all(getattr(mine, name) is getattr(others, name) for name in of_motion)
-        return same and np.array_equal(self.used, other.used) and self._has_approach_of(other)
-
-    def _has_approach_of(self, other: Self) -> bool:
-        """Whether the senses of approach at the used points are those of another problem."""
-        mine, others = self.motion.approach, other.motion.approach
-        if mine is others:
-            return True
-        return np.array_equal(np.asarray(mine)[self.used], np.asarray(others)[self.used], equal_nan=True)
+        if not (same and np.array_equal(self.used, other.used)):
+            return False
+        here, there = (np.broadcast_to(one.approach, one.drive.shape)[self.used] for one in (mine, others))
+        return np.array_equal(here, there, equal_nan=True)
 
     def with_approach(self, state: ModelState) -> Self:
         """The problem with the senses in which the drives arrive, as a state and the readings determine them."""

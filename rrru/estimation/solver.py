@@ -381,12 +381,11 @@ class _Linearized:
         unit = np.where(np.isfinite(self.sd), self.sd, 1.0 / np.where(length > 0.0, length, 1.0))
         brake = np.column_stack([np.sqrt(damping) * np.eye(count), np.zeros(count)])
         whole = np.concatenate([np.column_stack([columns * unit, target]), brake])
-        damped, free = triangle_of(whole), np.ones(count, dtype=bool)
-        step = -unit * solve_triangular(damped[:-1, :-1], damped[:-1, -1])
-        if ((step < self.low) | (step > self.high)).any():
-            found, side = _between(damped, self.low / unit, self.high / unit)
-            step, free = np.clip(unit * found, self.low, self.high), side == 0
-            step[~free] = np.where(side < 0, self.low, self.high)[~free]
+        damped = triangle_of(whole)
+        found, side = _between(damped, self.low / unit, self.high / unit)
+        free = side == 0
+        step = np.where(free, np.clip(unit * found, self.low, self.high), np.where(side < 0, self.low, self.high))
+        if not free.all():
             damped = triangle_of(whole[:, [*np.flatnonzero(free), count]])
         moved = columns @ step
         slope = -float(target @ moved)
@@ -399,12 +398,13 @@ def _between(triangle: FloatArray, low: FloatArray, high: FloatArray) -> tuple[F
     Side -1 is a parameter at its lower bound, 1 at its upper one, 0 inside. Bounds count for those parameters alone
     that leave them otherwise: the others are eliminated, which is faster where few of many parameters do.
     """
-    from scipy.optimize import lsq_linear
-
     count = len(low)
     found, side = -solve_triangular(triangle[:-1, :-1], triangle[:-1, -1]), np.zeros(count, dtype=int)
     bounded = np.zeros(count, dtype=bool)
     while (leaves := ~bounded & ((found < low) | (found > high))).any():
+        # loaded where a bound is reached
+        from scipy.optimize import lsq_linear
+
         bounded |= leaves
         inside, some = np.flatnonzero(~bounded), np.flatnonzero(bounded)
         ordered = np.asarray(np.linalg.qr(triangle[:, [*inside, *some, count]], mode="r"))
