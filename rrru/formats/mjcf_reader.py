@@ -31,16 +31,24 @@ def backlash_joints(model: mujoco.MjModel) -> dict[int, int]:
 
     A robot is read with these joints in the middle of their ranges. Returns the driven joint by joint.
     """
-    kinds = [int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT)]
-    driven = {
-        int(j) for j, kind in zip(model.actuator_trnid[:, 0], model.actuator_trntype, strict=True) if kind in kinds
-    }
+    driven = _actuators(model).keys()
     result = {}
     for joint in set(np.flatnonzero(model.jnt_limited).tolist()) - driven:
         for other in driven:
             same = model.jnt_bodyid[joint] == model.jnt_bodyid[other] and model.jnt_type[joint] == model.jnt_type[other]
             if same and _on_one_line(model, joint, other):
                 result[joint] = other
+    return result
+
+
+def _actuators(model: mujoco.MjModel) -> dict[int, int]:
+    """Number of the first actuator of every joint that has one."""
+    kinds = [int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT)]
+    ofs = enumerate(zip(model.actuator_trnid[:, 0].tolist(), model.actuator_trntype, strict=True))
+    result: dict[int, int] = {}
+    for number, (joint, kind) in ofs:
+        if kind in kinds:
+            result.setdefault(joint, number)
     return result
 
 
@@ -211,7 +219,10 @@ class Assembly:
 
     @cached_property
     def paths(self) -> list[tuple[int, ...]]:
-        """Paths of seams from the base to the platform that meet no part twice, in the order of their constraints."""
+        """Paths of seams from the base to the platform that meet no part twice.
+
+        They are in the order of the actuators that they have, those without after the others, and of their constraints.
+        """
         result, target = [], self.frames[self.platform][0]
 
         def go(part: int, met: set[int], path: tuple[int, ...]) -> None:
@@ -223,7 +234,16 @@ class Assembly:
                     go(seam.other(part), met | {seam.other(part)}, (*path, number))
 
         go(self.base, {self.base}, ())
-        return sorted(result, key=lambda path: (tuple(n for n in path if self._closes(n)), path))
+        return sorted(
+            result, key=lambda path: (self._actuators_along(path), tuple(n for n in path if self._closes(n)), path)
+        )
+
+    def _actuators_along(self, path: tuple[int, ...]) -> tuple[float, ...]:
+        """Numbers, in ascending order, of the actuators of a path's joints, infinity where it has none."""
+        moves = [item for n in path for item in self.seams[n].items if isinstance(item, Move)]
+        actuators = _actuators(self.model)
+        found = {actuators[move.joint] for move in moves if move.joint in actuators}
+        return tuple(sorted(found)) or (np.inf,)
 
     def names_along(self, path: tuple[int, ...]) -> tuple[str, ...]:
         """Names of the joints and connects along a path."""

@@ -1,5 +1,6 @@
 """Names of a robot's drives in sentences, tables and figures, by legs or joints and by the kind of drive."""
 
+import re
 from dataclasses import dataclass
 
 from rrru.kinematics.robot import Robot
@@ -15,12 +16,14 @@ class DriveWords:
     """Words for the drives of one robot.
 
     names: of the drives' sites; kinds: of the drives, each one of KINDS; parallel: whether every drive has a leg of its
-    own, which then is named by its number.
+    own, which then is named by its number; labels: of the drives in a file of readings, without the unit. A leg whose
+    drive's label has another number, or none, is named with it.
     """
 
     names: tuple[str, ...] = ()
     kinds: tuple[str, ...] = ()
     parallel: bool = True
+    labels: tuple[str, ...] = ()
 
     @property
     def noun(self) -> str:
@@ -35,7 +38,9 @@ class DriveWords:
     def name(self, number: int) -> str:
         """Name of a drive, or of a joint that follows drives, by its number from 1 on."""
         if self.parallel:
-            return f"leg {number}"
+            label = self.labels[number - 1] if number <= len(self.labels) else str(number)
+            numbered = number in map(int, re.findall(r"\d+", label))
+            return f"leg {number}" if numbered else f"leg {number} ({label})"
         return self.names[number - 1] if number <= len(self.names) else f"driven joint {number}"
 
     @property
@@ -63,4 +68,5 @@ def drive_words(robot: Robot) -> DriveWords:
     bars = {leg.bar_sites[0] for leg in robot.legs.legs if leg.bar}
     drives = robot.parts.drives
     kinds = (TURNING if drive.unit == "rad" else LENGTH if drive.site in bars else SLIDING for drive in drives)
-    return DriveWords(tuple(drive.site for drive in drives), tuple(kinds), robot.legs.parallel)
+    labels = (drive.column.removesuffix(f"_{drive.unit}") for drive in drives)
+    return DriveWords(tuple(drive.site for drive in drives), tuple(kinds), robot.legs.parallel, tuple(labels))

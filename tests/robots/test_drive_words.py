@@ -18,6 +18,21 @@ def test_legs_are_numbered_and_drives_of_an_arm_have_their_own_names():
     assert legs.place(2) == "in leg 2" and legs.noun == "leg" and set(legs.kinds) == {TURNING}
 
 
+def test_legs_are_in_the_order_of_the_actuators_and_have_the_name_of_a_drive_that_says_more(tmp_path):
+    text = (ROOT / "data/models/rrru3.xml").read_text()
+    first = '    <position name="servo1" class="drive" joint="drive1"/>\n'
+    last = '    <position name="servo3" class="drive" joint="drive3"/>\n'
+    text = text.replace(first, "").replace(last, last + first).replace('"drive3"', '"left"')
+    (tmp_path / "own.xml").write_text(text)
+    own = make_mechanism("own", {"mjcf": str(tmp_path / "own.xml"), "platform": "plate"}, parameter_set="zero")
+    assert [drive.site for drive in own.parts.drives] == ["drive2", "left", "drive1"]
+    for number, leg in enumerate(own.legs.legs):
+        assert leg.name == f"leg {number + 1}" and number in {joint.drive for joint in leg.joints}
+    words = drive_words(own)
+    assert words.all_names == ("leg 1 (drive2)", "leg 2 (left)", "leg 3 (drive1)")
+    assert words.place(2) == "in leg 2 (left)" and words.name(4) == "leg 4"
+
+
 def test_rails_struts_and_cables_are_no_turning_drives():
     assert set(drive_words(Ptt3()).kinds) == {SLIDING}
     hexapod = {"mjcf": str(ROOT / "data/models/hexapod.xml"), "platform": "plate"}

@@ -24,7 +24,7 @@ _MODEL = r"(?:(?:it|them)(?: and )?)?(?:possible further causes \([^)]*\))?"
 _SHARE = rf"(?P<share>{_NUMBER}) %(?: of the gap)?(?:{_ENDS})?"
 # text about a cause after its share or size
 _CAUSE = (
-    r"(?P<name>[a-z ]+?)(?P<place> (?:in leg \d+|at [^,:]+?))?"
+    r"(?P<name>[a-z ]+?)(?P<place> (?:in leg \d+(?: \([^)]*\))?|at [^,:]+?))?"
     rf"(?P<sizes>, (?:\d+ numbers|[^,]+?{_ENDS}(?:, [^,]+?{_ENDS})*))?(?:: .*)?\."
 )
 _P = rf"(?P<probability>more than 0\.99|less than 0\.01|{_NUMBER})"

@@ -126,7 +126,9 @@ def _place(stated, truth, facts):
     if name not in truth.effects or not truth.leg:
         return False if name not in truth.effects else None
     sites = [*truth.zeros]
-    return stated["place"].strip() in (f"at {sites[truth.leg - 1]}", f"in leg {truth.leg}")
+    # a leg has the name of its drive beside it where that has another number
+    place = re.sub(r" \([^)]*\)$", "", stated["place"].strip())
+    return place in (f"at {sites[truth.leg - 1]}", f"in leg {truth.leg}")
 
 
 def _share_of_cause(stated, truth, _facts):
