@@ -1,5 +1,6 @@
 """Pages of own robots judged sentence by sentence: what is judged against; every judge can say true and false."""
 
+import re
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -276,6 +277,19 @@ def test_an_open_question_whose_answers_hold_the_truth_is_no_false_one():
 def test_drives_that_bring_the_robot_nearer_than_the_estimate_are_right():
     claim = Claim("corrected_drives bring it there", "", {})
     assert judge.judge(claim, _truth(after_mm=0.05, drives_mm=0.01), _FACTS) is True
+
+
+def test_that_it_does_not_shrink_is_undecided_under_a_wrong_answer():
+    claim = Claim("it does not shrink", "", {})
+    assert judge.judge(claim, _truth(), _NONE) is None
+    assert judge.judge(claim, _truth(after_mm=0.5), _NONE) is True
+
+
+def test_a_leg_has_the_name_of_its_drive_beside_it():
+    for place, expected in ((" in leg 2 (right)", True), (" in leg 1 (left)", False)):
+        claim = Claim("place of a cause", "", {"name": "backlash", "place": place})
+        assert judge.judge(claim, _truth(), _FACTS) is expected
+    assert re.fullmatch(claims._CAUSE, "backlash in leg 2 (right).")["place"] == " in leg 2 (right)"
 
 
 def test_what_a_sample_of_fresh_stops_contradicts_within_its_errors_is_undecided():

@@ -120,6 +120,13 @@ def _probability_of_cause(stated, truth, _facts):
     return _one_of([stated["name"]], truth) if sure else None
 
 
+def _does_not_shrink(_stated, truth, facts):
+    """The corrected model misses by as much as the calibration; undecided under an answer that is wrong itself."""
+    if truth.after_mm >= truth.before_mm:
+        return True
+    return False if _verdict_right(facts, truth) else None
+
+
 def _place(stated, truth, facts):
     """The cause acts at the stated place."""
     name = stated["name"].replace(" ", "_")
@@ -418,7 +425,7 @@ _JUDGES = {
     "it is random error": _scatter,
     "what is left with it": lambda stated, t, _: _sized(stated["value"], t.after_mm, t, t.rows, t.after_error_mm2),
     "that it shrinks cannot be seen": lambda _, t, __: t.before_mm < t.noise_rms_mm,
-    "it does not shrink": lambda _, t, facts: t.after_mm >= t.before_mm or not _verdict_right(facts, t),
+    "it does not shrink": _does_not_shrink,
     "next, a run": _next_run,
     "next, none is advised": _unexplained,
     "next, nothing more": lambda _, t, facts: _verdict_right(facts, t),
