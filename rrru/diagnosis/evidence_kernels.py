@@ -278,14 +278,14 @@ def _dot(one: FloatArray, other: FloatArray, start: int, end: int) -> float:
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _order_columns(scale: FloatArray, positive: BoolArray) -> tuple[IntArray, int]:
-    """Order (k,) of columns in which little is computed again, and how many begin it that are alike in all rows (m, k).
+def _order_columns(scale: FloatArray, positive: BoolArray) -> tuple[IntArray, int, int]:
+    """Order (k,) of columns in which little is computed again; how many begin it that are alike in all rows (m, k).
 
-    Those alike come first, of these the ones that may be negative: moments are computed from the first positive one on.
-    The others stay in their order, since the last ones change most often.
+    Those alike come first, of these the ones that may be negative, which are counted, too: they are eliminated. The
+    others stay in their order, since the last ones change most often.
     """
     m, k = scale.shape
-    order, count = np.empty(k, dtype=np.int64), 0
+    order, count, eliminated = np.empty(k, dtype=np.int64), 0, 0
     alike = np.full(k, True)
     for c in range(k):
         for j in range(1, m):
@@ -297,7 +297,35 @@ def _order_columns(scale: FloatArray, positive: BoolArray) -> tuple[IntArray, in
             if (2 if not alike[c] else 1 if positive[c] else 0) == kind:
                 order[count] = c
                 count += 1
-    return order, alike.sum()
+        if kind == 0:
+            eliminated = count
+    return order, eliminated, alike.sum()
+
+
+@numba.njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc"})
+def _eliminate(
+    gram: FloatArray, moment: FloatArray, scale: FloatArray, low: FloatArray, half: FloatArray
+) -> tuple[FloatArray, FloatArray, float]:
+    """Gram matrix (k - e, k - e), of which the lower half is made, and moments of what the first e columns leave.
+
+    gram (k, k), of which the lower half is read, moment (k,): of all; scale (e,), low (e, e), half (e,): of the first
+    ones, `_factorize`. Returns their log evidence as well.
+    """
+    e, k = len(scale), len(moment)
+    squares, logs = np.zeros(e + 1), np.zeros((e + 1, 2))
+    logs[0, 1] = 1.0
+    _factorize(gram, moment, scale, 0, low, half, squares, logs)
+    left, rest, across = np.empty((k - e, k - e)), np.empty(k - e), np.empty((k - e, e))
+    for r in range(k - e):
+        for c in range(e):
+            entry = scale[c] * gram[e + r, c]
+            for q in range(c):
+                entry -= low[c, q] * across[r, q]
+            across[r, c] = entry * low[c, c]
+        rest[r] = moment[e + r] - _dot(across[r], half, 0, e)
+        for c in range(r + 1):
+            left[r, c] = gram[e + r, e + c] - _dot(across[r], across[c], 0, e)
+    return left, rest, 0.5 * (squares[e] - logs[e, 0] - math.log(logs[e, 1]))
 
 
 @numba.njit(cache=True, error_model="numpy")
@@ -322,15 +350,18 @@ def log_evidence_and_correction(
     gram: FloatArray, moment: FloatArray, scale: FloatArray, positive: BoolArray
 ) -> tuple[FloatArray, FloatArray]:
     """`log_evidence` (v, m), and the correction (v, m) of the probability of non-negative coefficients in it."""
-    v, k = moment.shape
-    m, (columns, fixed) = len(scale), _order_columns(scale, positive)
-    deviations, index = scale[:, columns], np.flatnonzero(positive[columns])
+    (v, k), m = moment.shape, len(scale)
+    columns, eliminated, alike = _order_columns(scale, positive)
+    n, fixed = k - eliminated, alike - eliminated
+    always, deviations = scale[0, columns[:eliminated]], scale[:, columns[eliminated:]]
+    index = np.flatnonzero(positive[columns[eliminated:]])
     p = len(index)
     ordered, target = np.empty((k, k)), np.empty(k)
     result, corrections = np.empty((v, m)), np.zeros((v, m))
-    low, half, squares, logs = np.zeros((k, k)), np.empty(k), np.zeros(k + 1), np.zeros((k + 1, 2))
+    first_low, first_half = np.zeros((eliminated, eliminated)), np.empty(eliminated)
+    low, half, squares, logs = np.zeros((n, n)), np.empty(n), np.zeros(n + 1), np.zeros((n + 1, 2))
     logs[0, 1] = 1.0
-    inverse, mean, covariance = np.zeros((p, k)), np.empty(p), np.empty((p, p))
+    inverse, mean, covariance = np.zeros((p, n)), np.empty(p), np.empty((p, p))
     known = np.zeros((p, p + 1))
     order, state = np.empty(p, dtype=np.int64), np.empty((p, COLUMNS))
     # prior scales that an effect's upper bound caps have the same deviations
@@ -340,6 +371,7 @@ def log_evidence_and_correction(
             target[r] = moment[level, columns[r]]
             for c in range(r + 1):
                 ordered[r, c] = gram[level, columns[r], columns[c]]
+        left, rest, gained = _eliminate(ordered, target, always, first_low, first_half)
         before = 0
         for j in range(m):
             if same[j] < j:
@@ -347,11 +379,11 @@ def log_evidence_and_correction(
                 continue
             # rows of the factor stay as long as no scale up to them changes
             first = 0
-            while j > 0 and first < k and deviations[j, first] == deviations[before, first]:
+            while j > 0 and first < n and deviations[j, first] == deviations[before, first]:
                 first += 1
             before = j
-            _factorize(ordered, target, deviations[j], first, low, half, squares, logs)
-            total = 0.5 * (squares[k] - logs[k, 0] - math.log(logs[k, 1]))
+            _factorize(left, rest, deviations[j], first, low, half, squares, logs)
+            total = gained + 0.5 * (squares[n] - logs[n, 0] - math.log(logs[n, 1]))
             if p:
                 _find_moments(low, half, index, first, fixed, inverse, known, mean, covariance)
                 probability, corrections[level, j] = log_orthant(mean, covariance, order, state)
