@@ -434,11 +434,23 @@ def log_evidence(gram: FloatArray, moment: FloatArray, scale: FloatArray, positi
     return log_evidence_and_correction(gram, moment, scale, positive)[0]
 
 
+@numba.njit(cache=True, error_model="numpy")
+def _log_sums(value: FloatArray) -> FloatArray:
+    """Logarithm (r,) of the sums of exponentials of each row of values (r, m)."""
+    result = np.empty(len(value))
+    for r in range(len(value)):
+        top, count, others = value[r].max(), 0, 0.0
+        for entry in value[r]:
+            if entry == top:
+                count += 1
+            else:
+                others += math.exp(entry - top)
+        result[r] = math.log1p(others / count) + math.log(count) + top
+    return result
+
+
 def log_sum_exp(value: FloatArray) -> FloatArray:
     """Logarithm of the sums of exponentials along the last axis: scipy's, without what it costs on small arrays."""
-    top = value.max(axis=-1, keepdims=True)
-    largest = value == top
-    count = largest.sum(axis=-1)
-    others = np.exp(np.where(largest, -np.inf, value) - top).sum(axis=-1)
-    result: FloatArray = np.log1p(others / count) + np.log(count) + top[..., 0]
+    rows = np.ascontiguousarray(value).reshape(-1, value.shape[-1])
+    result: FloatArray = _log_sums(rows).reshape(value.shape[:-1])[()]
     return result
