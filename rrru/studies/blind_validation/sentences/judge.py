@@ -133,7 +133,7 @@ def _place(stated, truth, facts):
     if name not in truth.effects or not truth.leg:
         return False if name not in truth.effects else None
     sites = [*truth.zeros]
-    # a leg has the name of its drive beside it where that has another number
+    # the name of its drive follows a leg where that has another number
     place = re.sub(r" \([^)]*\)$", "", stated["place"].strip())
     return place in (f"at {sites[truth.leg - 1]}", f"in leg {truth.leg}")
 
